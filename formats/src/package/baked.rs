@@ -1,0 +1,107 @@
+//! The baked payload: everything the frame path reads, in the order it reads it. Written by the baker, opened by the
+//! runtime without allocating.
+//!
+//! Vertices carry two numbers: the source order (`vertex`) and the elimination order of the factor (`solver`). Decode,
+//! right-hand side and solve run in solver order; positions, normals and faces keep source order.
+
+use rkyv::{Archive, Serialize, with::InlineAsBox};
+
+use super::FEATURE_COUNT;
+
+/// The frame path's data: V vertices, F faces, B blocks, K components.
+#[derive(Archive, Serialize, Debug)]
+pub struct BakedBasis<'a> {
+    /// Content id of the compact package this was baked from.
+    pub compact_id: [u8; 16],
+    /// Rest shape in **solver** order. Shape: `[V]`.
+    #[rkyv(with = InlineAsBox)]
+    pub rest_positions: &'a [[f32; 3]],
+    /// Triangles in **source** order. Shape: `[F]`.
+    #[rkyv(with = InlineAsBox)]
+    pub faces: &'a [[u32; 3]],
+    /// Shape: `[V]`, a permutation.
+    #[rkyv(with = InlineAsBox)]
+    pub solver_from_vertex: &'a [u32],
+    /// Shape: `[V]`, its inverse.
+    #[rkyv(with = InlineAsBox)]
+    pub vertex_from_solver: &'a [u32],
+    /// One-rings (with bridges) in solver order, compressed rows. Shape: `[V + 1]`, starts at 0, never falls.
+    #[rkyv(with = InlineAsBox)]
+    pub ring_offsets: &'a [u32],
+    /// Solver indices, ascending within a row, never the row itself. Shape: `[2 * edges]`.
+    #[rkyv(with = InlineAsBox)]
+    pub ring: &'a [u32],
+    /// Half the cotangent sum of each edge, non-negative, symmetric. Shape: that of `ring`.
+    #[rkyv(with = InlineAsBox)]
+    pub ring_weights: &'a [f32],
+    /// Columns of the unit lower factor of `L + anchor = F D F^T`, below the diagonal. Shape: `[V + 1]`.
+    #[rkyv(with = InlineAsBox)]
+    pub factor_offsets: &'a [u32],
+    /// Row (solver index) of each entry, ascending within a column, greater than the column.
+    #[rkyv(with = InlineAsBox)]
+    pub factor_rows: &'a [u32],
+    /// Entries of F. Shape: that of `factor_rows`.
+    #[rkyv(with = InlineAsBox)]
+    pub factor_values: &'a [f32],
+    /// `1 / D`, positive. Shape: `[V]`.
+    #[rkyv(with = InlineAsBox)]
+    pub inverse_pivots: &'a [f32],
+    /// Network value to log-rotation, radians. Positive.
+    pub rotation_scale: f32,
+    /// Network value to stretch. Positive.
+    pub stretch_scale: f32,
+    /// Blocks, parents before children. Shape: `[B]`.
+    #[rkyv(with = InlineAsBox)]
+    pub blocks: &'a [BakedBlock],
+    /// Components in block order. Shape: `[K]`.
+    #[rkyv(with = InlineAsBox)]
+    pub components: &'a [BakedComponent<'a>],
+    /// Vertices (solver indices, ascending within a block) that any of a block's components moves. Shape: `[sum of support_count]`.
+    #[rkyv(with = InlineAsBox)]
+    pub support: &'a [u32],
+    /// For each entry of a component the place in its block's support, ascending within a component.
+    #[rkyv(with = InlineAsBox)]
+    pub entry_slots: &'a [u32],
+    /// Folded values `point C_k + neighbour mean C_k` as IEEE half bits, times the component's `value_scale`. Shape: that of `entry_slots`.
+    #[rkyv(with = InlineAsBox)]
+    pub entry_values: &'a [[u16; FEATURE_COUNT]],
+}
+
+/// One autoencoder block, folded: `x_v += tanh(bias + sum_k z_k C_k,v) - tanh(bias)` on its support.
+#[derive(Archive, Serialize, Debug, Clone, Copy, PartialEq)]
+pub struct BakedBlock {
+    /// 0 for the root block.
+    pub level: u32,
+    /// The component above this block; [`super::NONE`] for the root.
+    pub parent_component: u32,
+    /// First of this block's components.
+    pub first_component: u32,
+    /// How many components follow.
+    pub component_count: u32,
+    /// First of this block's vertices in `support`.
+    pub first_support: u32,
+    /// How many vertices follow.
+    pub support_count: u32,
+    /// Bias of the decoder's convolution.
+    pub bias: [f32; FEATURE_COUNT],
+}
+
+/// One component and its control.
+#[derive(Archive, Serialize, Debug, Clone, Copy, PartialEq)]
+pub struct BakedComponent<'a> {
+    /// Unique name of the control.
+    #[rkyv(with = InlineAsBox)]
+    pub name: &'a str,
+    /// The block this component is a latent of.
+    pub block: u32,
+    /// Lower stop of the control; at most 0.
+    pub minimum: f32,
+    /// Upper stop of the control; at least 0.
+    pub maximum: f32,
+    /// First entry in `entry_slots` and `entry_values`.
+    pub first_entry: u32,
+    /// How many entries follow.
+    pub entry_count: u32,
+    /// Multiplies the half-precision values. Positive.
+    pub value_scale: f32,
+}

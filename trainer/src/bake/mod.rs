@@ -1,0 +1,1 @@
+//! From a compact package to a baked one: fold, order, factor.

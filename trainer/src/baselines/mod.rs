@@ -1,0 +1,1 @@
+//! The peers, trained on the same shapes, for the same table.

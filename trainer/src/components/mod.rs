@@ -1,0 +1,1 @@
+//! Components: closed-form start, extraction from the trained network, removal of redundant ones.

@@ -1,0 +1,1 @@
+//! Quality, measured through the runtime: E_rms, STED, projections.

@@ -1,0 +1,1 @@
+//! Rigid motion of each shape onto the reference.

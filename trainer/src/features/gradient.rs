@@ -1,0 +1,1 @@
+//! Deformation gradient of every one-ring.

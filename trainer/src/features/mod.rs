@@ -1,0 +1,9 @@
+//! From shapes to features: rigid alignment, deformation gradients, polar decomposition, consistent rotations, scaling
+//! (method section 1).
+
+pub mod acap;
+pub mod align;
+pub mod gradient;
+pub mod polar;
+pub mod reconstruct;
+pub mod scaler;

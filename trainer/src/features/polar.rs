@@ -1,0 +1,1 @@
+//! Polar decomposition T = R S.

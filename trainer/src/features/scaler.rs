@@ -1,0 +1,1 @@
+//! Features into the network's range and back.

@@ -1,0 +1,1 @@
+//! Cotangent edge weights of the rest shape.

@@ -1,0 +1,1 @@
+//! Fits the network: data, loss, optimiser, checkpoints.
