@@ -3,6 +3,19 @@
 
 mod baked;
 mod basis;
+mod error;
+#[cfg(feature = "std")]
+mod file;
+#[cfg(any(all(test, feature = "alloc"), feature = "fixture"))]
+pub mod fixture;
+mod header;
+pub mod limits;
+mod open;
+mod rules;
+#[cfg(all(test, feature = "alloc"))]
+mod tests;
+#[cfg(feature = "alloc")]
+mod write;
 
 pub use baked::{
     ArchivedBakedBasis, ArchivedBakedBlock, ArchivedBakedComponent, BakedBasis, BakedBlock, BakedComponent,
@@ -11,6 +24,13 @@ pub use basis::{
     ArchivedBlockRecord, ArchivedCompactBasis, ArchivedComponentRecord, ArchivedGraphConvRecord, ArchivedProvenance,
     ArchivedQuality, BlockRecord, CompactBasis, ComponentRecord, GraphConvRecord, Provenance, Quality,
 };
+pub use error::OpenError;
+#[cfg(feature = "std")]
+pub use file::{ReadError, SaveError, read_package, save_package};
+pub use header::{FIRST_VERSION, FORMAT_VERSION, HEADER_BYTES, Header, MAGIC, PAYLOAD_ALIGNMENT, PackageKind};
+pub use open::{BakedView, CompactEntry, CompactView};
+#[cfg(feature = "alloc")]
+pub use write::{AlignedBytes, WriteError, write_baked, write_compact};
 
 /// Features a vertex: axis-angle log-rotation xyz, then stretch xx xy xz yy yz zz.
 pub const FEATURE_COUNT: usize = 9;

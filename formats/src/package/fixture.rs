@@ -1,0 +1,408 @@
+//! Hand-made packages small enough to break byte by byte: a bumpy 3 x 3 grid with a root block of two components and a
+//! block on each. Feature `fixture`; nothing on the path of data uses it.
+//!
+//! The mesh, its Laplacian and its factor belong together, and the baked package is folded from the compact one, so
+//! that a frame runs on it: the smallest worked example of what a baker does, dense and plain.
+
+use alloc::vec::Vec;
+
+use half::f16;
+
+use super::{
+    BakedBasis, BakedBlock, BakedComponent, BlockRecord, CompactBasis, ComponentRecord, FEATURE_COUNT, GraphConvRecord,
+    Header, NONE, PackageKind, Provenance, Quality, write_compact,
+};
+
+/// V of the grid.
+pub const VERTEX_COUNT: usize = 9;
+/// K: two coarse components, one fine component on each.
+pub const COMPONENT_COUNT: usize = 4;
+/// Elimination order: the middle of the grid last.
+pub const VERTEX_FROM_SOLVER: [u32; VERTEX_COUNT] = [0, 2, 6, 8, 1, 3, 5, 7, 4];
+/// The vertex that the solve holds.
+pub const ANCHOR_VERTEX: u32 = 0;
+
+/// Owns what a [`CompactBasis`] borrows; a test changes a field and writes.
+#[derive(Debug, Clone)]
+#[expect(missing_docs, reason = "fields are those of CompactBasis")]
+pub struct TinyCompact {
+    pub rest_positions: Vec<[f32; 3]>,
+    pub faces: Vec<[u32; 3]>,
+    pub bridges: Vec<[u32; 2]>,
+    pub anchor_vertex: u32,
+    pub rotation_scale: f32,
+    pub stretch_scale: f32,
+    pub blocks: Vec<BlockRecord>,
+    pub components: Vec<ComponentRecord<'static>>,
+    pub support_bits: Vec<u32>,
+    pub values: Vec<[u16; FEATURE_COUNT]>,
+    pub provenance: Provenance<'static>,
+    pub quality: Quality,
+}
+
+/// Owns what a [`BakedBasis`] borrows; a test changes a field and writes.
+#[derive(Debug, Clone)]
+#[expect(missing_docs, reason = "fields are those of BakedBasis")]
+pub struct TinyBaked {
+    pub compact_id: [u8; 16],
+    pub rest_positions: Vec<[f32; 3]>,
+    pub faces: Vec<[u32; 3]>,
+    pub solver_from_vertex: Vec<u32>,
+    pub vertex_from_solver: Vec<u32>,
+    pub ring_offsets: Vec<u32>,
+    pub ring: Vec<u32>,
+    pub ring_weights: Vec<f32>,
+    pub factor_offsets: Vec<u32>,
+    pub factor_rows: Vec<u32>,
+    pub factor_values: Vec<f32>,
+    pub inverse_pivots: Vec<f32>,
+    pub rotation_scale: f32,
+    pub stretch_scale: f32,
+    pub blocks: Vec<BakedBlock>,
+    pub components: Vec<BakedComponent<'static>>,
+    pub support: Vec<u32>,
+    pub entry_slots: Vec<u32>,
+    pub entry_values: Vec<[u16; FEATURE_COUNT]>,
+}
+
+impl TinyCompact {
+    /// Borrowed, ready to be written.
+    pub fn basis(&self) -> CompactBasis<'_> {
+        CompactBasis {
+            rest_positions: &self.rest_positions,
+            faces: &self.faces,
+            bridges: &self.bridges,
+            anchor_vertex: self.anchor_vertex,
+            rotation_scale: self.rotation_scale,
+            stretch_scale: self.stretch_scale,
+            blocks: &self.blocks,
+            components: &self.components,
+            support_bits: &self.support_bits,
+            values: &self.values,
+            provenance: self.provenance,
+            quality: self.quality,
+        }
+    }
+}
+
+impl TinyBaked {
+    /// Borrowed, ready to be written.
+    pub fn basis(&self) -> BakedBasis<'_> {
+        BakedBasis {
+            compact_id: self.compact_id,
+            rest_positions: &self.rest_positions,
+            faces: &self.faces,
+            solver_from_vertex: &self.solver_from_vertex,
+            vertex_from_solver: &self.vertex_from_solver,
+            ring_offsets: &self.ring_offsets,
+            ring: &self.ring,
+            ring_weights: &self.ring_weights,
+            factor_offsets: &self.factor_offsets,
+            factor_rows: &self.factor_rows,
+            factor_values: &self.factor_values,
+            inverse_pivots: &self.inverse_pivots,
+            rotation_scale: self.rotation_scale,
+            stretch_scale: self.stretch_scale,
+            blocks: &self.blocks,
+            components: &self.components,
+            support: &self.support,
+            entry_slots: &self.entry_slots,
+            entry_values: &self.entry_values,
+        }
+    }
+}
+
+/// The compact package.
+pub fn tiny_compact() -> TinyCompact {
+    let block = |level, parent_component, first_component, component_count| BlockRecord {
+        level,
+        parent_component,
+        first_component,
+        component_count,
+        encoder: convolution(0.5, 0.25, 0.0),
+        decoder: convolution(0.75, 0.25, 0.0625),
+    };
+    let component = |name, block, centre_vertex, scale| ComponentRecord {
+        name,
+        block,
+        centre_vertex,
+        scale,
+        strength: 0.125,
+        locality: 0.875,
+        minimum: -1.5,
+        maximum: 2.0,
+        value_scale: 0.5,
+    };
+    // Rows 0 and 1 of the grid; rows 1 and 2; a corner each.
+    let supports: [&[usize]; COMPONENT_COUNT] = [&[0, 1, 2, 3, 4, 5], &[3, 4, 5, 6, 7, 8], &[1, 2], &[6, 7]];
+    let values = supports.iter().enumerate().flat_map(|(k, support)| {
+        support.iter().map(move |&v| {
+            core::array::from_fn(|i| {
+                let step = ((3 * k + 5 * v + 7 * i) % 17) as f32;
+                f16::from_f32((step - 8.0) / 16.0).to_bits()
+            })
+        })
+    });
+    TinyCompact {
+        rest_positions: rest_positions(),
+        faces: faces(),
+        bridges: alloc::vec![[0, 8]],
+        anchor_vertex: ANCHOR_VERTEX,
+        rotation_scale: 0.75,
+        stretch_scale: 0.25,
+        blocks: alloc::vec![block(0, NONE, 0, 2), block(1, 0, 2, 1), block(1, 1, 3, 1)],
+        components: alloc::vec![
+            component("c00", 0, 1, 0.5),
+            component("c01", 0, 7, 0.5),
+            component("c00.f0", 1, 2, 0.25),
+            component("c01.f0", 2, 6, 0.25),
+        ],
+        support_bits: supports
+            .iter()
+            .map(|support| support.iter().map(|v| 1 << v).sum())
+            .collect(),
+        values: values.collect(),
+        provenance: Provenance {
+            tool: "hand-made",
+            sequence: "grid",
+            config: "seed = 7\n",
+            seed: 7,
+            shape_count: 4,
+            train_shapes: &[0, 2],
+        },
+        quality: Quality {
+            validation_e_rms: 1.25,
+            steps: 30,
+            steps_run: 40,
+        },
+    }
+}
+
+/// The baked package of [`tiny_compact`].
+pub fn tiny_baked() -> TinyBaked {
+    let compact = tiny_compact();
+    let weights = edge_weights();
+    let solver_from_vertex: Vec<u32> = (0..VERTEX_COUNT as u32)
+        .map(|vertex| VERTEX_FROM_SOLVER.iter().position(|&v| v == vertex).unwrap_or_default() as u32)
+        .collect();
+    let mut baked = TinyBaked {
+        compact_id: compact_id(&compact),
+        rest_positions: VERTEX_FROM_SOLVER.map(|v| compact.rest_positions[v as usize]).to_vec(),
+        faces: compact.faces.clone(),
+        solver_from_vertex,
+        vertex_from_solver: VERTEX_FROM_SOLVER.to_vec(),
+        ring_offsets: alloc::vec![0],
+        ring: Vec::new(),
+        ring_weights: Vec::new(),
+        factor_offsets: alloc::vec![0],
+        factor_rows: Vec::new(),
+        factor_values: Vec::new(),
+        inverse_pivots: Vec::new(),
+        rotation_scale: compact.rotation_scale,
+        stretch_scale: compact.stretch_scale,
+        blocks: Vec::new(),
+        components: Vec::new(),
+        support: Vec::new(),
+        entry_slots: Vec::new(),
+        entry_values: Vec::new(),
+    };
+    for row in 0..VERTEX_COUNT {
+        for column in 0..VERTEX_COUNT {
+            if let Some(weight) = weights[VERTEX_FROM_SOLVER[row] as usize][VERTEX_FROM_SOLVER[column] as usize] {
+                baked.ring.push(column as u32);
+                baked.ring_weights.push(weight);
+            }
+        }
+        baked.ring_offsets.push(baked.ring.len() as u32);
+    }
+    factorize(&mut baked);
+    fold(&compact, &mut baked);
+    baked
+}
+
+/// The Laplacian, with 1 added at the anchor, to `F D F^T`, dense.
+fn factorize(baked: &mut TinyBaked) {
+    let mut lower = [[0.0_f64; VERTEX_COUNT]; VERTEX_COUNT];
+    for row in 0..VERTEX_COUNT {
+        for entry in baked.ring_offsets[row] as usize..baked.ring_offsets[row + 1] as usize {
+            let weight = f64::from(baked.ring_weights[entry]);
+            lower[row][row] += weight;
+            lower[row][baked.ring[entry] as usize] -= weight;
+        }
+    }
+    let anchor = baked.solver_from_vertex[ANCHOR_VERTEX as usize] as usize;
+    lower[anchor][anchor] += 1.0;
+    for column in 0..VERTEX_COUNT {
+        let pivot = lower[column][column];
+        baked.inverse_pivots.push((1.0 / pivot) as f32);
+        for row in column + 1..VERTEX_COUNT {
+            let value = lower[row][column] / pivot;
+            for other in column + 1..VERTEX_COUNT {
+                lower[row][other] -= value * lower[column][other];
+            }
+            if value != 0.0 {
+                baked.factor_rows.push(row as u32);
+                baked.factor_values.push(value as f32);
+            }
+        }
+        baked.factor_offsets.push(baked.factor_rows.len() as u32);
+    }
+}
+
+/// Multiplies the components by the decoders: `point C_k + neighbour mean C_k`, on supports grown by a ring.
+fn fold(compact: &TinyCompact, baked: &mut TinyBaked) {
+    let dense = dense_components(compact);
+    for (b, block) in compact.blocks.iter().enumerate() {
+        let own = block.first_component as usize..(block.first_component + block.component_count) as usize;
+        let folded: Vec<Vec<[f32; FEATURE_COUNT]>> = own
+            .clone()
+            .map(|k| convolve(&block.decoder, &dense[k], baked))
+            .collect();
+        let moves = |solver: usize| folded.iter().any(|component| component[solver] != [0.0; FEATURE_COUNT]);
+        let support: Vec<usize> = (0..VERTEX_COUNT).filter(|&solver| moves(solver)).collect();
+        baked.blocks.push(BakedBlock {
+            level: block.level,
+            parent_component: block.parent_component,
+            first_component: block.first_component,
+            component_count: block.component_count,
+            first_support: baked.support.len() as u32,
+            support_count: support.len() as u32,
+            bias: block.decoder.bias,
+        });
+        for (k, component) in own.zip(&folded) {
+            let first_entry = baked.entry_slots.len() as u32;
+            for (slot, &solver) in support.iter().enumerate() {
+                if component[solver] != [0.0; FEATURE_COUNT] {
+                    baked.entry_slots.push(slot as u32);
+                    baked
+                        .entry_values
+                        .push(component[solver].map(|value| f16::from_f32(value).to_bits()));
+                }
+            }
+            let record = compact.components[k];
+            baked.components.push(BakedComponent {
+                name: record.name,
+                block: b as u32,
+                minimum: record.minimum,
+                maximum: record.maximum,
+                first_entry,
+                entry_count: baked.entry_slots.len() as u32 - first_entry,
+                value_scale: record.value_scale,
+            });
+        }
+        baked.support.extend(support.iter().map(|&solver| solver as u32));
+    }
+}
+
+/// Components without their value scales. Shape: `[K][V]`, source order.
+fn dense_components(compact: &TinyCompact) -> Vec<[[f32; FEATURE_COUNT]; VERTEX_COUNT]> {
+    let mut values = compact.values.iter();
+    let dense = compact.support_bits.iter().map(|bits| {
+        core::array::from_fn(|v| match bits >> v & 1 {
+            1 => values.next().map_or([0.0; FEATURE_COUNT], |halves| {
+                halves.map(|half| f16::from_bits(half).to_f32())
+            }),
+            _ => [0.0; FEATURE_COUNT],
+        })
+    });
+    dense.collect()
+}
+
+/// One component through a convolution without its bias; in source order, out solver order.
+fn convolve(
+    conv: &GraphConvRecord,
+    component: &[[f32; FEATURE_COUNT]; VERTEX_COUNT],
+    baked: &TinyBaked,
+) -> Vec<[f32; FEATURE_COUNT]> {
+    let in_solver_order = |solver: u32| component[VERTEX_FROM_SOLVER[solver as usize] as usize];
+    let product = |matrix: &[[f32; FEATURE_COUNT]; FEATURE_COUNT], input: [f32; FEATURE_COUNT]| {
+        matrix.map(|row| row.iter().zip(input).map(|(a, x)| a * x).sum::<f32>())
+    };
+    let convolved = (0..VERTEX_COUNT).map(|solver| {
+        let ring = &baked.ring[baked.ring_offsets[solver] as usize..baked.ring_offsets[solver + 1] as usize];
+        let mean: [f32; FEATURE_COUNT] = core::array::from_fn(|i| {
+            ring.iter().map(|&other| in_solver_order(other)[i]).sum::<f32>() / ring.len() as f32
+        });
+        let (point, neighbour) = (
+            product(&conv.point, in_solver_order(solver as u32)),
+            product(&conv.neighbour, mean),
+        );
+        core::array::from_fn(|i| point[i] + neighbour[i])
+    });
+    convolved.collect()
+}
+
+/// A grid of unit squares, its middle raised.
+fn rest_positions() -> Vec<[f32; 3]> {
+    (0..VERTEX_COUNT)
+        .map(|v| [(v % 3) as f32, (v / 3) as f32, if v == 4 { 0.5 } else { 0.0 }])
+        .collect()
+}
+
+/// Two triangles a square, counter-clockwise from above.
+fn faces() -> Vec<[u32; 3]> {
+    [0, 1, 3, 4]
+        .iter()
+        .flat_map(|&v: &u32| [[v, v + 1, v + 4], [v, v + 4, v + 3]])
+        .collect()
+}
+
+/// Half the cotangent sum of each edge, at least 0, and 1 for the bridge; none where no edge is.
+fn edge_weights() -> [[Option<f32>; VERTEX_COUNT]; VERTEX_COUNT] {
+    let positions = rest_positions();
+    let mut weights = [[None; VERTEX_COUNT]; VERTEX_COUNT];
+    for face in faces() {
+        for corner in 0..3 {
+            let [a, b, c] = [0, 1, 2].map(|turn| face[(corner + turn) % 3] as usize);
+            let leg = |to: usize| -> [f64; 3] {
+                core::array::from_fn(|i| f64::from(positions[to][i]) - f64::from(positions[a][i]))
+            };
+            let dot = |x: [f64; 3], y: [f64; 3]| x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
+            let (u, w) = (leg(b), leg(c));
+            let sine_squared = dot(u, u) * dot(w, w) - dot(u, w) * dot(u, w);
+            let half_cotangent = (0.5 * dot(u, w) / square_root(sine_squared)) as f32;
+            let sum: f32 = weights[b][c].unwrap_or(0.0) + half_cotangent;
+            weights[b][c] = Some(sum);
+            weights[c][b] = Some(sum);
+        }
+    }
+    for weight in weights.as_flattened_mut().iter_mut().flatten() {
+        *weight = weight.max(0.0);
+    }
+    weights[0][8] = Some(1.0);
+    weights[8][0] = Some(1.0);
+    weights
+}
+
+/// Newton's steps, as `core` has no square root: the same bits everywhere.
+fn square_root(square: f64) -> f64 {
+    const STEPS: usize = 40;
+    (0..STEPS).fold(square.max(1.0), |root, _| 0.5 * (root + square / root))
+}
+
+/// A matrix near a multiple of the identity, with a little of each neighbour in the list.
+fn convolution(point: f32, neighbour: f32, bias: f32) -> GraphConvRecord {
+    let matrix = |diagonal: f32| {
+        core::array::from_fn(|row: usize| {
+            core::array::from_fn(|column: usize| match row.abs_diff(column) {
+                0 => diagonal,
+                1 => diagonal / 16.0,
+                _ => 0.0,
+            })
+        })
+    };
+    GraphConvRecord {
+        point: matrix(point),
+        neighbour: matrix(neighbour),
+        bias: core::array::from_fn(|i| bias * i as f32 / FEATURE_COUNT as f32),
+    }
+}
+
+/// The id that the compact package gets when it is written.
+fn compact_id(compact: &TinyCompact) -> [u8; 16] {
+    write_compact(&compact.basis())
+        .ok()
+        .and_then(|bytes| Header::read(&bytes).ok())
+        .filter(|header| header.kind == PackageKind::Compact)
+        .map_or([0; 16], |header| header.content_id)
+}
