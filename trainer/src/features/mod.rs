@@ -3,6 +3,7 @@
 
 pub mod acap;
 pub mod align;
+mod branches;
 pub mod gradient;
 pub mod polar;
 pub mod reconstruct;
