@@ -1,1 +1,53 @@
-//! stub
+//! Sinew's runtime: weights of deformation components in, a deformed mesh out. `no_std`, no allocation, memory from the
+//! caller; every check that costs more than O(controls) happens once, in [`Basis::open`].
+//!
+//! Path of data, a frame: [`Controls`] -> blend (sparse folded components, tanh) -> decode (deformation gradients) ->
+//! solve (right-hand side, `L d = b`) -> positions -> [`Normals`]. [`Frame`] runs it; [`Tangent`] is its derivative along
+//! one control; [`Reconstruct`] enters it behind the network, with features of one's own.
+//!
+//! ```no_run
+//! use sinew_runtime::{Basis, Controls, Frame, Workspace, WorkspaceLayout};
+//! # fn play(bytes: &[u8], memory: &mut [u8], weights: &mut [f32], positions: &mut [[f32; 3]], normals: &mut [[f32; 3]])
+//! # -> Result<(), Box<dyn std::error::Error>> {
+//! let basis = Basis::open(bytes)?; // once: all heavy checks
+//! let layout = WorkspaceLayout::for_basis(&basis); // once: how much memory
+//! # assert!(memory.len() >= layout.unaligned_bytes());
+//! let mut workspace = Workspace::new(&basis, memory)?; // once: carves the caller's memory
+//! let mut controls = Controls::new(&basis, weights)?; // once: all at rest
+//! controls.set(0, 0.5)?;
+//! Frame { basis: &basis, controls: &controls, positions, normals: Some(normals) }.run(&mut workspace)?; // each frame
+//! # Ok(())
+//! # }
+//! ```
+#![no_std]
+#![forbid(unsafe_code)]
+
+#[cfg(test)]
+extern crate std;
+
+mod basis;
+mod blend;
+mod controls;
+mod decode;
+mod error;
+mod frame;
+mod linearize;
+mod normals;
+mod reconstruct;
+mod simd;
+mod solve;
+mod workspace;
+
+#[cfg(test)]
+mod fixture;
+
+pub use basis::{Basis, Component};
+pub use controls::Controls;
+pub use error::{Buffer, ControlError, FrameError, WorkspaceError};
+pub use frame::{Frame, FrameOutcome};
+pub use linearize::Tangent;
+pub use normals::Normals;
+pub use reconstruct::Reconstruct;
+pub use simd::scalar::surface::FALLBACK_NORMAL;
+pub use sinew_formats::package::{FEATURE_COUNT, OpenError};
+pub use workspace::{Workspace, WorkspaceLayout};

@@ -16,14 +16,15 @@ compile_error!("packages are little endian and read in place: Sinew does not run
 #[derive(Clone, Copy)]
 pub struct CompactView<'a> {
     header: Header,
-    archived: &'a ArchivedCompactBasis<'a>,
+    // An archive owns no borrow: `'static` leaves the view covariant, so it may be lent for shorter.
+    archived: &'a ArchivedCompactBasis<'static>,
 }
 
 /// An opened baked package; borrows its bytes. Fields mean what [`super::BakedBasis`] says.
 #[derive(Clone, Copy)]
 pub struct BakedView<'a> {
     header: Header,
-    archived: &'a ArchivedBakedBasis<'a>,
+    archived: &'a ArchivedBakedBasis<'static>,
 }
 
 /// The payload of a package that should be of `kind`, proved whole.
@@ -50,7 +51,7 @@ impl<'a> CompactView<'a> {
     /// Errors: any [`OpenError`]; the first fault found is the one reported.
     pub fn open(bytes: &'a [u8]) -> Result<Self, OpenError> {
         let (header, payload) = payload(bytes, PackageKind::Compact)?;
-        let archived = access::<ArchivedCompactBasis<'a>, Failure>(payload).map_err(|_| OpenError::Malformed)?;
+        let archived = access::<ArchivedCompactBasis<'static>, Failure>(payload).map_err(|_| OpenError::Malformed)?;
         let view = Self { header, archived };
         rules::compact::check(&view)?;
         Ok(view)
@@ -235,7 +236,7 @@ impl<'a> BakedView<'a> {
     /// Errors: any [`OpenError`]; the first fault found is the one reported.
     pub fn open(bytes: &'a [u8]) -> Result<Self, OpenError> {
         let (header, payload) = payload(bytes, PackageKind::Baked)?;
-        let archived = access::<ArchivedBakedBasis<'a>, Failure>(payload).map_err(|_| OpenError::Malformed)?;
+        let archived = access::<ArchivedBakedBasis<'static>, Failure>(payload).map_err(|_| OpenError::Malformed)?;
         let view = Self { header, archived };
         rules::baked::check(&view)?;
         Ok(view)

@@ -1,0 +1,228 @@
+//! The opened package: a checked view of the caller's bytes, nothing copied.
+
+use core::fmt;
+
+use sinew_formats::package::{BakedBlock, BakedView, FEATURE_COUNT, NONE, OpenError};
+
+use crate::simd::scalar::poisson::{Factor, Rings};
+
+/// A baked package, checked. Borrows the bytes; cheap to copy; may be shared between threads, each with its own workspace.
+#[derive(Clone, Copy)]
+pub struct Basis<'a> {
+    view: BakedView<'a>,
+}
+
+/// One component and its control.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Component<'a> {
+    /// Unique name, for example `c03.f2`.
+    pub name: &'a str,
+    /// The block this component is a latent of.
+    pub block: usize,
+    /// Level of its block: 0 for the coarse ones.
+    pub level: u32,
+    /// The component above it, if any.
+    pub parent: Option<usize>,
+    /// Lower stop of the control; at most 0.
+    pub minimum: f32,
+    /// Upper stop of the control; at least 0.
+    pub maximum: f32,
+}
+
+impl fmt::Debug for Basis<'_> {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (vertex_count, component_count) = (self.vertex_count(), self.component_count());
+        write!(out, "Basis({vertex_count} vertices, {component_count} components)")
+    }
+}
+
+impl<'a> Basis<'a> {
+    /// Opens a baked package; all heavy checks are here, and nothing after it can fail because of the package.
+    ///
+    /// # Errors
+    /// Every rule of the format has its own [`OpenError`]. The bytes must start at a multiple of 16.
+    pub fn open(bytes: &'a [u8]) -> Result<Self, OpenError> {
+        Ok(Self {
+            view: BakedView::open(bytes)?,
+        })
+    }
+
+    /// Identity of the package's content: two packages with the same id play the same.
+    pub fn id(&self) -> [u8; 16] {
+        self.view.content_id()
+    }
+
+    /// Identity of the compact package this one was baked from.
+    pub fn compact_id(&self) -> [u8; 16] {
+        self.view.compact_id()
+    }
+
+    /// V.
+    pub fn vertex_count(&self) -> usize {
+        self.view.vertex_count()
+    }
+
+    /// F.
+    pub fn face_count(&self) -> usize {
+        self.view.faces().len()
+    }
+
+    /// K, which is the number of controls.
+    pub fn component_count(&self) -> usize {
+        self.view.component_count()
+    }
+
+    /// Autoencoder blocks.
+    pub fn block_count(&self) -> usize {
+        self.view.block_count()
+    }
+
+    /// Component `k`. Panics if `k` is not less than [`Basis::component_count`], like a slice.
+    pub fn component(&self, k: usize) -> Component<'a> {
+        let record = self.view.component(k);
+        let block = self.view.block(record.block as usize);
+        Component {
+            name: record.name,
+            block: record.block as usize,
+            level: block.level,
+            parent: (block.parent_component != NONE).then_some(block.parent_component as usize),
+            minimum: record.minimum,
+            maximum: record.maximum,
+        }
+    }
+
+    /// All components in block order: coarse ones first. Shape: `[K]`.
+    pub fn components(&self) -> impl ExactSizeIterator<Item = Component<'a>> + use<'a> {
+        let basis = *self;
+        (0..self.component_count()).map(move |k| basis.component(k))
+    }
+
+    /// Index of the component of this name; O(K).
+    pub fn component_named(&self, name: &str) -> Option<usize> {
+        self.view.components().position(|record| record.name == name)
+    }
+
+    /// Triangles. Shape: `[F]`, source order, counter-clockwise.
+    pub fn faces(&self) -> &'a [[u32; 3]] {
+        self.view.faces()
+    }
+
+    /// Rest shape. Shape: `[V]`, **solver** order, units of the source.
+    pub fn rest_positions(&self) -> &'a [[f32; 3]] {
+        self.view.rest_positions()
+    }
+
+    /// Where a source vertex stands in solver order. Shape: `[V]`.
+    pub fn solver_from_vertex(&self) -> &'a [u32] {
+        self.view.solver_from_vertex()
+    }
+
+    /// Source vertex of each solver index. Shape: `[V]`.
+    pub fn vertex_from_solver(&self) -> &'a [u32] {
+        self.view.vertex_from_solver()
+    }
+
+    /// Radians a network unit of log-rotation.
+    pub fn rotation_scale(&self) -> f32 {
+        self.view.rotation_scale()
+    }
+
+    /// Stretch a network unit of stretch.
+    pub fn stretch_scale(&self) -> f32 {
+        self.view.stretch_scale()
+    }
+
+    pub(crate) fn block(&self, b: usize) -> BakedBlock {
+        self.view.block(b)
+    }
+
+    /// A block's vertices, solver order.
+    pub(crate) fn support(&self, block: &BakedBlock) -> &'a [u32] {
+        section(self.view.support(), block.first_support, block.support_count)
+    }
+
+    /// A component's entries.
+    pub(crate) fn entries(&self, k: usize) -> Entries<'a> {
+        let record = self.view.component(k);
+        Entries {
+            slots: section(self.view.entry_slots(), record.first_entry, record.entry_count),
+            values: section(self.view.entry_values(), record.first_entry, record.entry_count),
+            scale: record.value_scale,
+        }
+    }
+
+    pub(crate) fn rings(&self) -> Rings<'a> {
+        Rings {
+            offsets: self.view.ring_offsets(),
+            neighbours: self.view.ring(),
+            weights: self.view.ring_weights(),
+        }
+    }
+
+    pub(crate) fn factor(&self) -> Factor<'a> {
+        Factor {
+            offsets: self.view.factor_offsets(),
+            rows: self.view.factor_rows(),
+            values: self.view.factor_values(),
+            inverse_pivots: self.view.inverse_pivots(),
+        }
+    }
+}
+
+fn section<T>(whole: &[T], first: u32, count: u32) -> &[T] {
+    &whole[first as usize..][..count as usize]
+}
+
+/// A component's sparse values: at place `slots[n]` of its block's support, `scale * values[n]`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Entries<'a> {
+    pub(crate) slots: &'a [u32],
+    /// IEEE half bits.
+    pub(crate) values: &'a [[u16; FEATURE_COUNT]],
+    pub(crate) scale: f32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{Package, open};
+
+    #[test]
+    fn components_are_found_by_name_and_know_their_tree() {
+        let package = Package::small(1);
+        let basis = open(&package);
+        assert_eq!(basis.component_count(), Package::COMPONENTS);
+        for (k, component) in basis.components().enumerate() {
+            assert_eq!(basis.component_named(component.name), Some(k));
+            assert_eq!(component.level, u32::from(component.parent.is_some()));
+            assert!(component.minimum <= 0.0 && component.maximum >= 0.0);
+        }
+        assert_eq!(basis.component(2).parent, Some(0));
+        assert_eq!(basis.component(3).parent, Some(1));
+        assert_eq!(basis.component(0).parent, None);
+        assert_eq!(basis.component_named("no such"), None);
+    }
+
+    #[test]
+    fn every_prefix_is_refused() {
+        let package = Package::small(1);
+        for end in 0..package.bytes.len() {
+            assert!(Basis::open(&package.bytes[..end]).is_err());
+        }
+    }
+
+    #[test]
+    fn other_content_has_another_id() {
+        let (one, two) = (Package::small(1), Package::small(2));
+        assert_ne!(open(&one).id(), open(&two).id());
+        assert_eq!(open(&one).id(), open(&Package::small(1)).id());
+    }
+
+    #[test]
+    fn shared_between_threads() {
+        fn shared<T: Send + Sync>() {}
+        shared::<Basis<'static>>();
+        shared::<crate::Workspace<'static>>();
+        shared::<crate::Controls<'static>>();
+    }
+}

@@ -1,0 +1,54 @@
+//! Blend: the pose's weights to features, block by block (method section 2, the decoder half).
+
+use sinew_formats::package::{BakedBlock, FEATURE_COUNT};
+
+use crate::basis::Basis;
+use crate::simd::scalar::blend::{Features, accumulate, activate};
+
+/// Weights nearer to zero are zero: their products would be denormal and slow, and nobody sees them.
+const FLUSH_BELOW: f32 = 1e-6;
+
+/// A weight as the blend uses it.
+pub(crate) fn flushed(weight: f32) -> f32 {
+    if weight.abs() < FLUSH_BELOW { 0.0 } else { weight }
+}
+
+/// Fills `features` with the sum of all blocks at `weights`; zero where nothing reaches.
+///
+/// Shape: `weights` `[K]`, flushed; `pre_activations` at least the largest support; `features` `[V]`, solver order.
+pub(crate) fn blend(basis: &Basis<'_>, weights: &[f32], pre_activations: &mut [Features], features: &mut [Features]) {
+    features.fill([0.0; FEATURE_COUNT]);
+    for b in 0..basis.block_count() {
+        let block = basis.block(b);
+        let components = components(&block);
+        // tanh(bias) - tanh(bias): a block at rest adds nothing.
+        if weights[components].iter().all(|&w| w == 0.0) {
+            continue;
+        }
+        let pre = blend_block(basis, &block, weights, pre_activations);
+        activate(&block.bias, basis.support(&block), pre, features);
+    }
+}
+
+/// One block's pre-activations without the bias: `u = sum_k z_k C_k` on the block's support.
+pub(crate) fn blend_block<'p>(
+    basis: &Basis<'_>,
+    block: &BakedBlock,
+    weights: &[f32],
+    pre_activations: &'p mut [Features],
+) -> &'p [Features] {
+    let pre = &mut pre_activations[..block.support_count as usize];
+    pre.fill([0.0; FEATURE_COUNT]);
+    for k in components(block) {
+        if weights[k] != 0.0 {
+            let entries = basis.entries(k);
+            accumulate(entries.slots, entries.values, weights[k] * entries.scale, pre);
+        }
+    }
+    pre
+}
+
+fn components(block: &BakedBlock) -> core::ops::Range<usize> {
+    let first = block.first_component as usize;
+    first..first + block.component_count as usize
+}

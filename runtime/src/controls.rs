@@ -1,0 +1,147 @@
+//! Controls: the K weights a performer moves, kept in the caller's memory, always finite.
+
+use crate::basis::Basis;
+use crate::error::ControlError;
+
+/// One weight a component, 0 at rest. The weights live in the caller's slice.
+#[derive(Debug)]
+pub struct Controls<'c> {
+    basis: &'c Basis<'c>,
+    weights: &'c mut [f32],
+}
+
+impl<'c> Controls<'c> {
+    /// Takes `weights` as memory and sets all to rest. Shape: `[K]`.
+    ///
+    /// # Errors
+    /// [`ControlError::WrongLength`].
+    pub fn new(basis: &'c Basis<'c>, weights: &'c mut [f32]) -> Result<Self, ControlError> {
+        let expected = basis.component_count();
+        if weights.len() != expected {
+            return Err(ControlError::WrongLength {
+                expected,
+                actual: weights.len(),
+            });
+        }
+        weights.fill(0.0);
+        Ok(Self { basis, weights })
+    }
+
+    /// Sets a control, clamped into its component's range; returns the weight it took.
+    ///
+    /// # Errors
+    /// [`ControlError::NoSuchComponent`]; [`ControlError::NotFinite`] for NaN and infinities (an infinite knob is a fault, not
+    /// a wish for the stop). The weight then stays as it was.
+    pub fn set(&mut self, component: usize, weight: f32) -> Result<f32, ControlError> {
+        self.check(component, weight)?;
+        let range = self.basis.component(component);
+        let taken = weight.clamp(range.minimum, range.maximum);
+        self.weights[component] = taken;
+        Ok(taken)
+    }
+
+    /// Sets a control beyond its stops: for fitting, which may leave the range seen in training.
+    ///
+    /// # Errors
+    /// Those of [`Controls::set`].
+    pub fn set_unclamped(&mut self, component: usize, weight: f32) -> Result<(), ControlError> {
+        self.check(component, weight)?;
+        self.weights[component] = weight;
+        Ok(())
+    }
+
+    /// All controls to rest.
+    pub fn reset(&mut self) {
+        self.weights.fill(0.0);
+    }
+
+    /// The weights. Shape: `[K]`, finite.
+    pub fn weights(&self) -> &[f32] {
+        self.weights
+    }
+
+    /// The basis these controls belong to.
+    pub fn basis(&self) -> &Basis<'c> {
+        self.basis
+    }
+
+    fn check(&self, component: usize, weight: f32) -> Result<(), ControlError> {
+        let component_count = self.weights.len();
+        if component >= component_count {
+            return Err(ControlError::NoSuchComponent {
+                component,
+                component_count,
+            });
+        }
+        if !weight.is_finite() {
+            return Err(ControlError::NotFinite { component });
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixture::{Package, open};
+
+    #[test]
+    fn controls_start_at_rest_and_return_there() {
+        let package = Package::small(1);
+        let basis = open(&package);
+        let mut memory = [f32::NAN; Package::COMPONENTS];
+        let mut controls = Controls::new(&basis, &mut memory).unwrap();
+        assert_eq!(controls.weights(), [0.0; Package::COMPONENTS]);
+        controls.set_unclamped(2, 7.0).unwrap();
+        controls.reset();
+        assert_eq!(controls.weights(), [0.0; Package::COMPONENTS]);
+        assert_eq!(controls.basis().id(), basis.id());
+    }
+
+    #[test]
+    fn set_clamps_and_says_what_it_took() {
+        let package = Package::small(1);
+        let basis = open(&package);
+        let (minimum, maximum) = (basis.component(1).minimum, basis.component(1).maximum);
+        let mut memory = [0.0; Package::COMPONENTS];
+        let mut controls = Controls::new(&basis, &mut memory).unwrap();
+        assert_eq!(controls.set(1, 1e9), Ok(maximum));
+        assert_eq!(controls.set(1, -1e9), Ok(minimum));
+        assert_eq!(controls.set(1, 0.5 * maximum), Ok(0.5 * maximum));
+        assert_eq!(controls.set_unclamped(1, 2.0 * maximum), Ok(()));
+        assert_eq!(controls.weights()[1], 2.0 * maximum);
+    }
+
+    #[test]
+    fn validity() {
+        let package = Package::small(1);
+        let basis = open(&package);
+        let count = Package::COMPONENTS;
+        let mut memory = [0.0; Package::COMPONENTS + 1];
+        let refused = Controls::new(&basis, &mut memory).unwrap_err();
+        assert_eq!(
+            refused,
+            ControlError::WrongLength {
+                expected: count,
+                actual: count + 1
+            }
+        );
+
+        let mut controls = Controls::new(&basis, &mut memory[..count]).unwrap();
+        controls.set(0, 0.25).unwrap();
+        let missing = ControlError::NoSuchComponent {
+            component: count,
+            component_count: count,
+        };
+        assert_eq!(controls.set(count, 0.0), Err(missing));
+        assert_eq!(controls.set_unclamped(count, 0.0), Err(missing));
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            assert_eq!(controls.set(0, bad), Err(ControlError::NotFinite { component: 0 }));
+            assert_eq!(
+                controls.set_unclamped(0, bad),
+                Err(ControlError::NotFinite { component: 0 })
+            );
+        }
+        assert_eq!(controls.weights()[0], 0.25);
+    }
+}

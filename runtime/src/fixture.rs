@@ -1,0 +1,263 @@
+//! Small baked packages for unit tests: a grid, a hand-made component tree and a dense factor.
+
+use std::format;
+use std::string::String;
+use std::vec;
+use std::vec::Vec;
+
+use half::f16;
+use sinew_formats::package::{AlignedBytes, BakedBasis, BakedBlock, BakedComponent, NONE, write_baked};
+
+use crate::basis::Basis;
+use crate::simd::scalar::naive::Noise;
+use crate::simd::scalar::poisson::{Factor, Rings};
+use crate::workspace::{Workspace, WorkspaceLayout};
+
+/// A bumpy grid of triangles in a scrambled solver order, every edge of another weight.
+pub(crate) struct Grid {
+    pub(crate) rest: Vec<[f32; 3]>,
+    pub(crate) faces: Vec<[u32; 3]>,
+    pub(crate) solver_from_vertex: Vec<u32>,
+    pub(crate) anchor: usize,
+    offsets: Vec<u32>,
+    ring: Vec<u32>,
+    weights: Vec<f32>,
+}
+
+impl Grid {
+    pub(crate) fn new(width: u32, height: u32) -> Self {
+        let count = width * height;
+        let stride = (2..).find(|n| gcd(*n, count) == 1).unwrap();
+        let solver_from_vertex: Vec<u32> = (0..count).map(|v| (v * stride + 1) % count).collect();
+        let mut noise = Noise::new(100);
+        let mut rest = vec![[0.0; 3]; count as usize];
+        let mut faces = Vec::new();
+        let mut rows = vec![std::collections::BTreeMap::new(); count as usize];
+        for y in 0..height {
+            for x in 0..width {
+                let v = y * width + x;
+                rest[solver_from_vertex[v as usize] as usize] = [x as f32, y as f32, 0.3 * noise.next()];
+                if x + 1 < width && y + 1 < height {
+                    faces.push([v, v + 1, v + width]);
+                    faces.push([v + 1, v + width + 1, v + width]);
+                }
+            }
+        }
+        for face in &faces {
+            for (a, b) in [(0, 1), (1, 2), (2, 0)] {
+                let (i, j) = (
+                    solver_from_vertex[face[a] as usize],
+                    solver_from_vertex[face[b] as usize],
+                );
+                let weight = 1.0 + 0.5 * noise.next();
+                rows[i as usize].insert(j, weight);
+                rows[j as usize].insert(i, weight);
+            }
+        }
+        let mut offsets = vec![0];
+        let (mut ring, mut weights) = (Vec::new(), Vec::new());
+        for row in rows {
+            ring.extend(row.keys());
+            weights.extend(row.values());
+            offsets.push(ring.len() as u32);
+        }
+        Self {
+            rest,
+            faces,
+            solver_from_vertex,
+            anchor: count as usize / 2,
+            offsets,
+            ring,
+            weights,
+        }
+    }
+
+    pub(crate) fn vertex_count(&self) -> usize {
+        self.rest.len()
+    }
+
+    pub(crate) fn rings(&self) -> Rings<'_> {
+        Rings {
+            offsets: &self.offsets,
+            neighbours: &self.ring,
+            weights: &self.weights,
+        }
+    }
+
+    /// `(i, j, c_ij)`, each edge in both directions.
+    pub(crate) fn edges_both_ways(&self) -> impl Iterator<Item = (usize, usize, f32)> + '_ {
+        (0..self.vertex_count()).flat_map(move |i| {
+            let row = self.offsets[i] as usize..self.offsets[i + 1] as usize;
+            row.map(move |n| (i, self.ring[n] as usize, self.weights[n]))
+        })
+    }
+
+    /// Dense Laplacian with the anchor's penalty.
+    pub(crate) fn laplacian(&self) -> Vec<Vec<f64>> {
+        let mut matrix = vec![vec![0.0; self.vertex_count()]; self.vertex_count()];
+        for (i, j, weight) in self.edges_both_ways() {
+            matrix[i][j] -= f64::from(weight);
+            matrix[i][i] += f64::from(weight);
+        }
+        matrix[self.anchor][self.anchor] += 6.0;
+        matrix
+    }
+}
+
+fn gcd(a: u32, b: u32) -> u32 {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+/// A factor that owns its arrays.
+pub(crate) struct DenseFactor {
+    pub(crate) offsets: Vec<u32>,
+    pub(crate) rows: Vec<u32>,
+    pub(crate) values: Vec<f32>,
+    pub(crate) inverse_pivots: Vec<f32>,
+}
+
+impl DenseFactor {
+    pub(crate) fn view(&self) -> Factor<'_> {
+        Factor {
+            offsets: &self.offsets,
+            rows: &self.rows,
+            values: &self.values,
+            inverse_pivots: &self.inverse_pivots,
+        }
+    }
+}
+
+/// `F D F^T` of a dense symmetric matrix, zeros left out.
+pub(crate) fn factorise(matrix: &[Vec<f64>]) -> DenseFactor {
+    let count = matrix.len();
+    let mut a = matrix.to_vec();
+    let mut factor = DenseFactor {
+        offsets: vec![0],
+        rows: vec![],
+        values: vec![],
+        inverse_pivots: vec![],
+    };
+    for j in 0..count {
+        let pivot = a[j][j];
+        factor.inverse_pivots.push((1.0 / pivot) as f32);
+        for i in j + 1..count {
+            let value = a[i][j] / pivot;
+            if value != 0.0 {
+                factor.rows.push(i as u32);
+                factor.values.push(value as f32);
+                for c in j + 1..count {
+                    a[i][c] -= value * a[j][c];
+                }
+            }
+        }
+        factor.offsets.push(factor.rows.len() as u32);
+    }
+    factor
+}
+
+/// A baked package in memory, and what went into it.
+pub(crate) struct Package {
+    pub(crate) bytes: AlignedBytes,
+    pub(crate) rest_in_source_order: Vec<[f32; 3]>,
+}
+
+impl Package {
+    /// Components of every small package.
+    pub(crate) const COMPONENTS: usize = 5;
+
+    /// A 6 by 5 grid; a root block of two components, child blocks of one and of two under them.
+    pub(crate) fn small(seed: u64) -> Self {
+        Self::on(&Grid::new(6, 5), seed)
+    }
+
+    fn on(grid: &Grid, seed: u64) -> Self {
+        let mut noise = Noise::new(seed);
+        let count = grid.vertex_count() as u32;
+        let mut vertex_from_solver = vec![0; count as usize];
+        for (v, &s) in grid.solver_from_vertex.iter().enumerate() {
+            vertex_from_solver[s as usize] = v as u32;
+        }
+        let supports: [Vec<u32>; 3] = [
+            (0..count).collect(),
+            (0..count).filter(|s| s % 3 != 1).collect(),
+            (0..count).filter(|s| s % 2 == 0).collect(),
+        ];
+        let (mut blocks, mut components) = (Vec::new(), Vec::new());
+        let (mut support, mut slots, mut values) = (Vec::new(), Vec::new(), Vec::new());
+        let names: Vec<String> = (0..Self::COMPONENTS).map(|k| format!("c{k}")).collect();
+        for (b, (parent, component_count)) in [(NONE, 2), (0, 1), (1, 2)].into_iter().enumerate() {
+            blocks.push(BakedBlock {
+                level: u32::from(b > 0),
+                parent_component: parent,
+                first_component: components.len() as u32,
+                component_count,
+                first_support: support.len() as u32,
+                support_count: supports[b].len() as u32,
+                bias: noise.features().map(|x| 0.3 * x),
+            });
+            for _ in 0..component_count {
+                let k = components.len();
+                let first_entry = slots.len() as u32;
+                for slot in 0..supports[b].len() as u32 {
+                    if !(slot as usize + k).is_multiple_of(5) {
+                        slots.push(slot);
+                        values.push(noise.features().map(|x| f16::from_f32(0.125 * x).to_bits()));
+                    }
+                }
+                components.push(BakedComponent {
+                    name: &names[k],
+                    block: b as u32,
+                    minimum: -1.0 - k as f32,
+                    maximum: 1.5,
+                    first_entry,
+                    entry_count: slots.len() as u32 - first_entry,
+                    value_scale: 4.0,
+                });
+            }
+            support.extend(&supports[b]);
+        }
+        let factor = factorise(&grid.laplacian());
+        let bytes = write_baked(&BakedBasis {
+            compact_id: [7; 16],
+            rest_positions: &grid.rest,
+            faces: &grid.faces,
+            solver_from_vertex: &grid.solver_from_vertex,
+            vertex_from_solver: &vertex_from_solver,
+            ring_offsets: &grid.offsets,
+            ring: &grid.ring,
+            ring_weights: &grid.weights,
+            factor_offsets: &factor.offsets,
+            factor_rows: &factor.rows,
+            factor_values: &factor.values,
+            inverse_pivots: &factor.inverse_pivots,
+            rotation_scale: 1.5,
+            stretch_scale: 0.4,
+            blocks: &blocks,
+            components: &components,
+            support: &support,
+            entry_slots: &slots,
+            entry_values: &values,
+        })
+        .unwrap();
+        let rest_in_source_order = grid.solver_from_vertex.iter().map(|&s| grid.rest[s as usize]).collect();
+        Self {
+            bytes,
+            rest_in_source_order,
+        }
+    }
+}
+
+/// The fixture's bytes as the runtime sees them.
+pub(crate) fn open(package: &Package) -> Basis<'_> {
+    Basis::open(&package.bytes).unwrap()
+}
+
+/// Memory that is enough for a workspace.
+pub(crate) fn memory_for(basis: &Basis<'_>) -> Vec<u8> {
+    vec![0xff; WorkspaceLayout::for_basis(basis).unaligned_bytes()]
+}
+
+/// A workspace at rest.
+pub(crate) fn workspace_in<'w>(basis: &Basis<'_>, memory: &'w mut [u8]) -> Workspace<'w> {
+    Workspace::new(basis, memory).unwrap()
+}

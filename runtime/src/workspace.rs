@@ -1,0 +1,214 @@
+//! The memory of a frame: caller's bytes, carved once into the buffers between the steps, bound to one basis.
+//!
+//! A workspace always holds a pose that is finite and whole: the rest pose when new, then that of the last frame.
+
+use sinew_formats::package::FEATURE_COUNT;
+
+use crate::basis::Basis;
+use crate::error::{FrameError, WorkspaceError};
+
+/// Start of every buffer: a cache line, and the widest vector register.
+const ALIGNMENT: usize = 64;
+
+/// How much memory a workspace needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct WorkspaceLayout {
+    /// Bytes, when the memory starts at a multiple of `alignment`.
+    pub size_bytes: usize,
+    /// Preferred alignment of the memory, in bytes.
+    pub alignment: usize,
+}
+
+impl WorkspaceLayout {
+    /// Layout for `basis`: about 132 bytes a vertex.
+    pub fn for_basis(basis: &Basis<'_>) -> Self {
+        let sections = Sections::of(basis);
+        Self {
+            size_bytes: sections.size_bytes(),
+            alignment: ALIGNMENT,
+        }
+    }
+
+    /// Bytes that are enough wherever the memory starts.
+    pub fn unaligned_bytes(&self) -> usize {
+        self.size_bytes + self.alignment - 1
+    }
+}
+
+/// Element counts of the buffers, in the order in which they lie in memory.
+struct Sections {
+    components: usize,
+    vertices: usize,
+    largest_support: usize,
+}
+
+impl Sections {
+    fn of(basis: &Basis<'_>) -> Self {
+        let supports = (0..basis.block_count()).map(|b| basis.block(b).support_count as usize);
+        Self {
+            components: basis.component_count(),
+            vertices: basis.vertex_count(),
+            largest_support: supports.max().unwrap_or(0),
+        }
+    }
+
+    /// The limits of the format keep this under a gigabyte, which fits 32 bits.
+    fn size_bytes(&self) -> usize {
+        section_bytes::<f32>(self.components)
+            + 2 * section_bytes::<[f32; FEATURE_COUNT]>(self.vertices)
+            + section_bytes::<[f32; FEATURE_COUNT]>(self.largest_support)
+            + 2 * section_bytes::<[f32; 3]>(self.vertices)
+    }
+}
+
+/// Bytes of `count` elements, rounded up so that the next buffer is aligned.
+fn section_bytes<T>(count: usize) -> usize {
+    (count * size_of::<T>()).next_multiple_of(ALIGNMENT)
+}
+
+/// The buffers of the frame path. Made once; after that nothing needs memory.
+#[derive(Debug)]
+pub struct Workspace<'w> {
+    basis_id: [u8; 16],
+    /// Weights of the pose, tiny ones flushed. Shape: `[K]`.
+    pub(crate) weights: &'w mut [f32],
+    /// Features of the pose, network units. Shape: `[V]`, solver order.
+    pub(crate) features: &'w mut [[f32; FEATURE_COUNT]],
+    /// Displacement of the pose. Shape: `[V]`, solver order.
+    pub(crate) displacement: &'w mut [[f32; 3]],
+    /// Scratch: a block's blend. Shape: `[largest support]`.
+    pub(crate) pre_activations: &'w mut [[f32; FEATURE_COUNT]],
+    /// Scratch: `D = T - I` or its derivative. Shape: `[V]`, solver order.
+    pub(crate) gradients: &'w mut [[f32; FEATURE_COUNT]],
+    /// Scratch: a solve that is not the pose's. Shape: `[V]`, solver order.
+    pub(crate) solution: &'w mut [[f32; 3]],
+}
+
+impl<'w> Workspace<'w> {
+    /// Carves `memory`, sets the rest pose. Bytes beyond the layout's stay untouched.
+    ///
+    /// # Errors
+    /// [`WorkspaceError::TooSmall`], with the size that this memory would need given where it starts.
+    pub fn new(basis: &Basis<'_>, memory: &'w mut [u8]) -> Result<Self, WorkspaceError> {
+        let sections = Sections::of(basis);
+        let skipped = memory.as_ptr().align_offset(ALIGNMENT);
+        let required_bytes = skipped.saturating_add(sections.size_bytes());
+        if memory.len() < required_bytes {
+            return Err(WorkspaceError::TooSmall {
+                required_bytes,
+                actual_bytes: memory.len(),
+            });
+        }
+        let memory = &mut memory[skipped..required_bytes];
+        memory.fill(0);
+        let (weights, memory) = carve(memory, sections.components);
+        let (features, memory) = carve(memory, sections.vertices);
+        let (displacement, memory) = carve(memory, sections.vertices);
+        let (pre_activations, memory) = carve(memory, sections.largest_support);
+        let (gradients, memory) = carve(memory, sections.vertices);
+        let (solution, _) = carve(memory, sections.vertices);
+        let basis_id = basis.id();
+        Ok(Self {
+            basis_id,
+            weights,
+            features,
+            displacement,
+            pre_activations,
+            gradients,
+            solution,
+        })
+    }
+
+    /// Features of the pose, in network units. Shape: `[V]`, **solver** order; zero where no component reaches.
+    pub fn features(&self) -> &[[f32; FEATURE_COUNT]] {
+        self.features
+    }
+
+    /// Weights of the pose; those under 1e-6 count as zero. Shape: `[K]`.
+    pub fn weights(&self) -> &[f32] {
+        self.weights
+    }
+
+    /// Back to rest, which is exact.
+    pub(crate) fn rest(&mut self) {
+        self.weights.fill(0.0);
+        self.features.fill([0.0; FEATURE_COUNT]);
+        self.displacement.fill([0.0; 3]);
+    }
+
+    /// Refuses a basis other than the one this workspace was made for.
+    pub(crate) fn validate(&self, basis: &Basis<'_>) -> Result<(), FrameError> {
+        if self.basis_id == basis.id() {
+            Ok(())
+        } else {
+            Err(FrameError::ForeignWorkspace)
+        }
+    }
+}
+
+/// Splits the first `count` elements off aligned memory.
+fn carve<T: bytemuck::Pod>(memory: &mut [u8], count: usize) -> (&mut [T], &mut [u8]) {
+    let (section, rest) = memory.split_at_mut(section_bytes::<T>(count));
+    let section = &mut section[..count * size_of::<T>()];
+    (bytemuck::cast_slice_mut(section), rest)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::vec;
+
+    use super::*;
+    use crate::fixture::{Package, open};
+
+    #[test]
+    fn memory_may_start_anywhere() {
+        let package = Package::small(1);
+        let basis = open(&package);
+        let layout = WorkspaceLayout::for_basis(&basis);
+        let mut memory = vec![0xff_u8; layout.unaligned_bytes() + 70];
+        for start in 0..70 {
+            let workspace = Workspace::new(&basis, &mut memory[start..start + layout.unaligned_bytes()]).unwrap();
+            assert_eq!(workspace.weights.len(), basis.component_count());
+            assert_eq!(workspace.features().len(), basis.vertex_count());
+            assert!(workspace.features().iter().all(|x| *x == [0.0; FEATURE_COUNT]));
+            assert_eq!(workspace.gradients.as_ptr().align_offset(ALIGNMENT), 0);
+            assert_eq!(workspace.solution.as_ptr().align_offset(ALIGNMENT), 0);
+        }
+    }
+
+    #[test]
+    fn too_little_memory_is_refused_with_the_size_it_needs() {
+        let package = Package::small(1);
+        let basis = open(&package);
+        let layout = WorkspaceLayout::for_basis(&basis);
+        let mut memory = vec![0_u8; layout.unaligned_bytes()];
+        let skipped = memory.as_ptr().align_offset(layout.alignment);
+        let exact = skipped + layout.size_bytes;
+        assert!(Workspace::new(&basis, &mut memory[..exact]).is_ok());
+        for actual_bytes in [0, 1, exact - 1] {
+            let refused = Workspace::new(&basis, &mut memory[..actual_bytes]).unwrap_err();
+            assert!(matches!(refused, WorkspaceError::TooSmall { actual_bytes: a, .. } if a == actual_bytes));
+        }
+        let refused = Workspace::new(&basis, &mut memory[..exact - 1]).unwrap_err();
+        assert_eq!(
+            refused,
+            WorkspaceError::TooSmall {
+                required_bytes: exact,
+                actual_bytes: exact - 1
+            }
+        );
+    }
+
+    #[test]
+    fn layout_says_what_the_documentation_says() {
+        let package = Package::small(1);
+        let basis = open(&package);
+        let layout = WorkspaceLayout::for_basis(&basis);
+        let exact = 4 * basis.component_count() + 132 * basis.vertex_count();
+        assert!(
+            layout.size_bytes <= exact + 6 * layout.alignment,
+            "{} {exact}",
+            layout.size_bytes
+        );
+    }
+}
