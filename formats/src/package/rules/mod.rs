@@ -4,6 +4,8 @@
 
 pub(super) mod baked;
 pub(super) mod compact;
+#[cfg(all(test, feature = "alloc"))]
+mod tests;
 
 use super::{NONE, OpenError, limits};
 
