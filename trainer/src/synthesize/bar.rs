@@ -157,8 +157,8 @@ impl Motion {
     fn at(&self, t: f64, share: f64) -> Pose {
         let start = smoothstep(0.0, START_SECONDS, t);
         let bending = start * (1.0 - 0.9 * smoothstep(0.26, 0.46, share) + 0.9 * smoothstep(0.58, 0.78, share));
-        // Three half waves from 0.3 on: one way, the other, and back while bending.
-        let sweep = (1.5 * TAU * (share - 0.3).max(0.0) / 0.7).sin();
+        // One wave from 0.3 on: one way while straight, the other way while bent.
+        let sweep = (TAU * (share - 0.3).max(0.0) / 0.7).sin();
         Pose {
             lower_bend: [0, 1].map(|c| BEND_MAX * bending * self.lower_bend[c].at(t)),
             upper_bend: [0, 1].map(|c| BEND_MAX * bending * self.upper_bend[c].at(t)),

@@ -116,7 +116,7 @@ impl Wind {
 
     /// Metres a second.
     fn speed(&self, t: f64) -> f64 {
-        5.5 * (1.0 + 0.4 * self.gust.at(t))
+        4.6 * (1.0 + 0.4 * self.gust.at(t))
     }
 
     /// Velocity of the air at `p`.
