@@ -121,7 +121,8 @@ fn spread(edges: &[[u32; 2]], positions: &[[f32; 3]]) -> f64 {
     if across > 0.0 {
         along * PAIR_OFFSETS.len() as f64 / across
     } else {
-        1.0
+        // A shape in one point is a collapse, no other order.
+        0.0
     }
 }
 
@@ -182,7 +183,8 @@ mod tests {
     fn strong_deformations_pass() {
         let (rest, faces) = grid();
         let order = EdgeOrder::new(&faces, &rest);
-        let deformations: [(&str, Deformation); 6] = [
+        let deformations: [(&str, Deformation); 7] = [
+            ("in one point", |_| [1.0; 3]),
             ("grown", |p| p.map(|x| 100.0 * x)),
             ("shrunk", |p| p.map(|x| 0.001 * x)),
             ("stretched along one axis", |[x, y, z]| [30.0 * x, y, z]),

@@ -44,13 +44,13 @@ pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<PolygonMesh, SequenceEr
         match element.name {
             b"vertex" => read_vertices(&mut body, element, &mut mesh)?,
             b"face" => read_faces(&mut body, element, vertex_count, &mut mesh)?,
+            // An element without properties takes no bytes, so nothing stands behind its count.
+            _ if element.properties.is_empty() => {}
             _ => {
-                mesh.ignored_element_count = mesh.ignored_element_count.saturating_add(element.count);
-                if !element.properties.is_empty() {
-                    for _ in 0..element.count {
-                        for property in &element.properties {
-                            body.skip(property.kind)?;
-                        }
+                mesh.ignored_element_count += element.count;
+                for _ in 0..element.count {
+                    for property in &element.properties {
+                        body.skip(property.kind)?;
                     }
                 }
             }
@@ -387,7 +387,7 @@ mod tests {
             format!("{head}{}{face}", vertex.replace(" 1\n", " 4000000000\n")),
             format!("{head}{}{face}", vertex.replace(" 1\n", " 18446744073709551615\n")),
             format!("{head}{vertex}{}", face.replace(" 1\n", " 4000000000\n")),
-            format!("{head}{vertex}element none 18446744073709551615\n{face}"),
+            format!("{head}{vertex}element none 18446744073709551615\nproperty int a\n{face}"),
             format!("{head}{vertex}{}", face.replace("vertex_index", "corner")),
             format!("{head}{}{face}", vertex.replace("float z", "float y")),
             format!("{head}{vertex}{vertex}{face}"),

@@ -284,9 +284,7 @@ fn read_arrays(
 
 /// Refuses a reference without area.
 fn check_reference(path: &Path, name: &str, faces: &[[u32; 3]], positions: &[[f32; 3]]) -> Result<(), SequenceError> {
-    // Relative to the mesh, so that tiny units are no zero and rounding of far-off coordinates is.
-    let smallest = diagonal(positions).powi(2) * f64::from(f32::EPSILON).powi(2);
-    let has_area = faces.iter().any(|face| {
+    let area2 = faces.iter().map(|face| {
         let [a, b, c] = face.map(|v| positions[v as usize].map(f64::from));
         let (u, w) = (
             [b[0] - a[0], b[1] - a[1], b[2] - a[2]],
@@ -297,8 +295,10 @@ fn check_reference(path: &Path, name: &str, faces: &[[u32; 3]], positions: &[[f3
             u[2] * w[0] - u[0] * w[2],
             u[0] * w[1] - u[1] * w[0],
         ];
-        normal.iter().map(|n| n * n).sum::<f64>().sqrt() > smallest
+        normal.iter().map(|n| n * n).sum::<f64>().sqrt()
     });
+    // Beside the mesh's own size: tiny units are no zero, and what rounding leaves of a line is one.
+    let has_area = area2.sum::<f64>() > f64::from(f32::EPSILON) * diagonal(positions).powi(2);
     if has_area {
         Ok(())
     } else {
