@@ -1,0 +1,193 @@
+//! Opening a package, carving a workspace and playing allocate nothing, refusals included: counted by the allocator.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+use sinew_formats::package::{fixture::tiny_baked, write_baked};
+use sinew_runtime::{
+    Basis, ControlError, Controls, Frame, FrameError, FrameOutcome, Normals, OpenError, Reconstruct, Tangent,
+    Workspace, WorkspaceError, WorkspaceLayout,
+};
+
+thread_local! {
+    /// Requests of this thread. The test harness allocates on others.
+    static REQUESTS: Cell<u64> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+// SAFETY: every request goes to the system's allocator unchanged; counting touches a thread's own cell without heap.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        REQUESTS.set(REQUESTS.get() + 1);
+        // SAFETY: the caller's promise, passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        REQUESTS.set(REQUESTS.get() + 1);
+        // SAFETY: the caller's promise, passed on.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, new_bytes: usize) -> *mut u8 {
+        REQUESTS.set(REQUESTS.get() + 1);
+        // SAFETY: the caller's promise, passed on.
+        unsafe { System.realloc(pointer, layout, new_bytes) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Runs `work` and returns how often it went to the allocator.
+fn requests(work: impl FnOnce()) -> u64 {
+    let before = REQUESTS.get();
+    work();
+    REQUESTS.get() - before
+}
+
+/// The tiny package, and one of the same shape with another rest mesh.
+fn packages() -> [sinew_formats::package::AlignedBytes; 2] {
+    let baked = tiny_baked();
+    let mut other = tiny_baked();
+    other.rest_positions[0][2] += 0.25;
+    [baked, other].map(|baked| write_baked(&baked.basis()).expect("the fixture is valid"))
+}
+
+#[test]
+fn the_counter_counts() {
+    assert_eq!(requests(|| drop(std::hint::black_box(Box::new(1)))), 2);
+    assert_eq!(requests(|| ()), 0);
+}
+
+#[test]
+fn a_thousand_frames_allocate_nothing() {
+    let [bytes, _] = packages();
+    let layout = WorkspaceLayout::for_basis(&Basis::open(&bytes).expect("valid"));
+    let mut memory = vec![0; layout.unaligned_bytes()];
+    let mut weights = [0.0; sinew_formats::package::fixture::COMPONENT_COUNT];
+    let mut positions = [[0.0; 3]; sinew_formats::package::fixture::VERTEX_COUNT];
+    let mut normals = positions;
+    let mut tangent = positions;
+    let mut solved = 0;
+    let count = requests(|| {
+        let basis = Basis::open(&bytes).expect("valid");
+        let mut workspace = Workspace::new(&basis, &mut memory).expect("enough memory");
+        let mut controls = Controls::new(&basis, &mut weights).expect("one weight a component");
+        for frame in 0..1000 {
+            let k = frame % basis.component_count();
+            // Every third frame changes nothing.
+            if frame % 3 != 0 {
+                controls.set(k, (frame as f32 * 0.1).sin()).expect("finite");
+            }
+            let (positions, normals) = (&mut positions, Some(&mut normals[..]));
+            let job = Frame {
+                basis: &basis,
+                controls: &controls,
+                positions,
+                normals,
+            };
+            solved += usize::from(job.run(&mut workspace).expect("finite") == FrameOutcome::Solved);
+            let job = Tangent {
+                basis: &basis,
+                component: k,
+                displacement: &mut tangent,
+            };
+            job.run(&mut workspace).expect("finite");
+        }
+        let mut features = [[0.0; 9]; sinew_formats::package::fixture::VERTEX_COUNT];
+        features.copy_from_slice(workspace.features());
+        let job = Reconstruct {
+            basis: &basis,
+            features: &features,
+            positions: &mut tangent,
+        };
+        job.run(&mut workspace).expect("finite");
+        assert!(basis.component_named("no such").is_none());
+        assert_eq!(basis.components().len(), basis.component_count());
+    });
+    assert_eq!(count, 0);
+    assert!(solved > 600, "{solved} frames had work to do");
+}
+
+#[test]
+fn refusals_allocate_nothing() {
+    let [bytes, other] = packages();
+    let mut damaged = bytes.clone();
+    let last = damaged.len() - 1;
+    damaged.as_mut_slice()[last] ^= 1;
+    let (basis, foreign) = (Basis::open(&bytes).expect("valid"), Basis::open(&other).expect("valid"));
+    let (vertex_count, component_count) = (basis.vertex_count(), basis.component_count());
+    let layout = WorkspaceLayout::for_basis(&basis);
+    let (mut memory, mut foreign_memory) = (vec![0; layout.unaligned_bytes()], vec![0; layout.unaligned_bytes()]);
+    let (mut weights, mut foreign_weights) = (vec![0.0; component_count], vec![0.0; component_count]);
+    let (mut positions, mut normals) = (vec![[0.0; 3]; vertex_count], vec![[0.0; 3]; vertex_count]);
+    let features = vec![[f32::NAN; 9]; vertex_count];
+    let count = requests(|| {
+        assert!(matches!(Basis::open(&damaged), Err(OpenError::PayloadCorrupt { .. })));
+        assert!(Basis::open(&bytes[..last]).is_err());
+        assert!(Basis::open(&[]).is_err());
+
+        let refused = Workspace::new(&basis, &mut memory[..8]);
+        assert!(matches!(refused, Err(WorkspaceError::TooSmall { .. })));
+        let refused = Controls::new(&basis, &mut weights[..1]);
+        assert!(matches!(refused, Err(ControlError::WrongLength { .. })));
+
+        let mut workspace = Workspace::new(&basis, &mut memory).expect("enough memory");
+        let mut foreign_workspace = Workspace::new(&foreign, &mut foreign_memory).expect("enough memory");
+        let mut controls = Controls::new(&basis, &mut weights).expect("one weight a component");
+        let foreign_controls = Controls::new(&foreign, &mut foreign_weights).expect("one weight a component");
+        assert_eq!(controls.set(0, f32::NAN), Err(ControlError::NotFinite { component: 0 }));
+        assert!(controls.set(component_count, 0.0).is_err());
+
+        let mut frame = |controls: &Controls<'_>, length: usize, workspace: &mut Workspace<'_>| {
+            let (positions, normals) = (&mut positions[..length], Some(&mut normals[..]));
+            Frame {
+                basis: &basis,
+                controls,
+                positions,
+                normals,
+            }
+            .run(workspace)
+        };
+        assert_eq!(
+            frame(&controls, vertex_count, &mut foreign_workspace),
+            Err(FrameError::ForeignWorkspace)
+        );
+        assert_eq!(
+            frame(&foreign_controls, vertex_count, &mut workspace),
+            Err(FrameError::ForeignControls)
+        );
+        let short = frame(&controls, vertex_count - 1, &mut workspace);
+        assert!(matches!(short, Err(FrameError::WrongLength { .. })));
+        for k in 0..component_count {
+            controls.set_unclamped(k, f32::MAX).expect("finite");
+        }
+        // Overflow: an answer or a refusal, but no allocation either way.
+        let _ = frame(&controls, vertex_count, &mut workspace);
+
+        let missing = Tangent {
+            basis: &basis,
+            component: component_count,
+            displacement: &mut positions,
+        };
+        assert!(missing.run(&mut workspace).is_err());
+        let broken = Reconstruct {
+            basis: &basis,
+            features: &features,
+            positions: &mut positions,
+        };
+        assert_eq!(
+            broken.run(&mut workspace),
+            Err(FrameError::FeatureNotFinite { vertex: 0 })
+        );
+        let short = Normals {
+            basis: &basis,
+            positions: &positions[1..],
+            normals: &mut normals,
+        };
+        assert!(short.run().is_err());
+    });
+    assert_eq!(count, 0);
+}

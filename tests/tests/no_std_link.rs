@@ -1,0 +1,67 @@
+//! The runtime links into a program that has neither std nor an allocator, and plays the same bits there.
+#![cfg(target_os = "linux")]
+
+use std::error::Error;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use sinew_formats::package::{fixture::tiny_baked, write_baked};
+use sinew_runtime::{Basis, Controls, Frame, Workspace, WorkspaceLayout};
+
+#[test]
+fn a_program_without_an_allocator_links_and_plays_the_same_bits() -> Result<(), Box<dyn Error>> {
+    let bytes = write_baked(&tiny_baked().basis())?;
+    let scratch = Path::new(env!("CARGO_TARGET_TMPDIR")).join("embedded");
+    fs::create_dir_all(&scratch)?;
+    let package = scratch.join("tiny.sinew");
+    fs::write(&package, &bytes[..])?;
+
+    // The versions that this workspace is tested with; cargo drops what the program does not need.
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("embedded");
+    fs::copy(source.join("../../Cargo.lock"), source.join("Cargo.lock"))?;
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let built = Command::new(cargo)
+        .args(["build", "--release", "--offline", "--quiet", "--manifest-path"])
+        .arg(source.join("Cargo.toml"))
+        .env("CARGO_TARGET_DIR", &scratch)
+        .env("SINEW_EMBEDDED_PACKAGE", &package)
+        .output()?;
+    assert!(built.status.success(), "{}", String::from_utf8_lossy(&built.stderr));
+
+    let ran = Command::new(scratch.join("release/sinew-embedded")).output()?;
+    assert!(ran.status.success(), "exit code {:?}", ran.status.code());
+    assert_eq!(
+        String::from_utf8(ran.stdout)?.trim_end(),
+        format!("{:016x}", play(&bytes)?)
+    );
+    Ok(())
+}
+
+/// What `embedded/src/main.rs` does, with std around it.
+fn play(bytes: &[u8]) -> Result<u64, Box<dyn Error>> {
+    let basis = Basis::open(bytes)?;
+    let mut memory = vec![0; WorkspaceLayout::for_basis(&basis).unaligned_bytes()];
+    let mut workspace = Workspace::new(&basis, &mut memory)?;
+    let mut weights = vec![0.0; basis.component_count()];
+    let mut controls = Controls::new(&basis, &mut weights)?;
+    let mut positions = vec![[0.0; 3]; basis.vertex_count()];
+    let mut normals = positions.clone();
+    let mut checksum = 0xcbf2_9ce4_8422_2325;
+    for k in 0..basis.component_count() {
+        controls.set(k, 0.5 * basis.component(k).maximum)?;
+        let job = Frame {
+            basis: &basis,
+            controls: &controls,
+            positions: &mut positions,
+            normals: Some(&mut normals),
+        };
+        job.run(&mut workspace)?;
+        for x in positions.as_flattened().iter().chain(normals.as_flattened()) {
+            for byte in x.to_bits().to_le_bytes() {
+                checksum = (checksum ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
+            }
+        }
+    }
+    Ok(checksum)
+}
