@@ -1,1 +1,6 @@
-//! Fits the network: data, loss, optimiser, checkpoints.
+//! Fits the network: batches in, gradients from `network`, steps of Adam, validation, checkpoints; weights out.
+
+pub mod checkpoint;
+pub mod data;
+pub mod fit;
+mod optimizer;

@@ -1,0 +1,489 @@
+//! The training loop: every block of the stack jointly, with validation, early stopping, rollback and exact resume.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use crossbeam::channel::{Receiver, bounded};
+use serde::{Deserialize, Serialize};
+use sinew_formats::package::FEATURE_COUNT;
+use thiserror::Error;
+
+use super::checkpoint::{self, CheckpointError};
+use super::data::BatchSource;
+use super::optimizer::Stepper;
+use crate::mesh::topology::Topology;
+use crate::network::kernel::Kernel;
+use crate::network::loss::{LossSettings, LossTerms, SparsityRegions};
+use crate::network::ring::RingMean;
+use crate::network::weights::StackWeights;
+
+/// Learning rate times the root of V: 3e-4 at 1,500 vertices, 1.3e-4 at 8,400. Rows of C have unit length, so their
+/// entries, and with them a sensible step, shrink with the root of V.
+const RATE_TIMES_ROOT_V: f32 = 1.2e-2;
+/// Returns to the best weights before the fit gives up.
+const ROLLBACK_LIMIT: u32 = 8;
+
+/// How to train.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FitSettings {
+    /// Steps of the optimiser; the rate's decay is planned over them.
+    pub steps: usize,
+    /// Learning rate at the first step; by the number of vertices (1.2e-2 / √V) where absent.
+    pub rate: Option<f32>,
+    /// Multiplies the rate for C.
+    pub component_rate_factor: f32,
+    /// Multiplies the rate for the convolutions.
+    pub convolution_rate_factor: f32,
+    /// The rate decays exponentially to this share at the last step, in (0, 1].
+    pub final_share: f32,
+    /// Steps between two looks at the validation error.
+    pub validate_every: usize,
+    /// Validations without improvement after which the fit stops; 0 for never.
+    pub patience: usize,
+    /// Seconds after which the fit stops, resumed time included. A fit bounded by time is not reproducible to the bit.
+    pub time_budget_s: Option<f64>,
+    /// Steps between two checkpoints.
+    pub checkpoint_every: usize,
+    /// What to minimise.
+    pub loss: LossSettings,
+}
+
+impl Default for FitSettings {
+    fn default() -> Self {
+        Self {
+            steps: 400,
+            rate: None,
+            component_rate_factor: 1.0,
+            convolution_rate_factor: 0.3,
+            final_share: 0.01,
+            validate_every: 20,
+            patience: 5,
+            time_budget_s: None,
+            checkpoint_every: 50,
+            loss: LossSettings::local(),
+        }
+    }
+}
+
+/// The mesh as the fit needs it. V vertices.
+pub struct FitInput<'a> {
+    /// One-rings of the reference shape.
+    pub topology: &'a Topology,
+    /// Weight of each vertex in all norms: areas, mean one. Shape: `[V]`.
+    pub vertex_weights: &'a [f32],
+    /// The g_i of the position term; empty for none. Shape: `[I][V][9]`.
+    pub position_modes: &'a [f32],
+    /// Geodesic distances from a vertex as a share of the mesh's largest, shape `[V]`; asked for at most once a vertex.
+    pub distances: &'a (dyn Fn(usize) -> Vec<f32> + Sync),
+}
+
+/// Whether to go on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Flow {
+    /// Take the next step.
+    Continue,
+    /// Write a checkpoint and return.
+    Stop,
+}
+
+/// One point of the training curve.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HistoryPoint {
+    /// Steps taken.
+    pub step: usize,
+    /// The loss on this step's shapes, before the step.
+    pub loss: LossTerms,
+    /// The validation error after the step, where it was measured and finite.
+    pub validation: Option<f32>,
+}
+
+/// What an observer sees after every step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FitProgress {
+    /// Steps taken, from 1.
+    pub step: usize,
+    /// Steps planned.
+    pub steps: usize,
+    /// The loss on this step's shapes, before the step.
+    pub loss: LossTerms,
+    /// The validation error after the step, where it was measured and finite.
+    pub validation: Option<f32>,
+    /// The best validation error so far.
+    pub best: Option<f32>,
+    /// Seconds spent, resumed time included.
+    pub seconds: f64,
+    /// Times the loss stopped being a number and the fit went back to its best weights at half the rate.
+    pub rollbacks: u32,
+}
+
+/// Why a fit ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StopReason {
+    /// All planned steps are done.
+    Finished,
+    /// The validation error stopped improving.
+    NoImprovement,
+    /// The time budget is spent.
+    OutOfTime,
+    /// The observer asked to stop.
+    Stopped,
+}
+
+/// What a fit leaves.
+#[derive(Debug, Clone)]
+pub struct FitOutcome {
+    /// The weights with the least validation error, the start included.
+    pub weights: StackWeights,
+    /// Their validation error, where one was finite.
+    pub best_validation: Option<f32>,
+    /// Steps behind them.
+    pub best_step: usize,
+    /// Steps taken in all.
+    pub steps_run: usize,
+    /// The training curve.
+    pub history: Vec<HistoryPoint>,
+    /// Times the fit went back to its best weights.
+    pub rollbacks: u32,
+    /// Why it ended.
+    pub stop_reason: StopReason,
+}
+
+/// Why a fit cannot go on.
+#[derive(Debug, Error)]
+pub enum TrainingError {
+    /// The start is no complete stack, or not finite.
+    #[error("the weights to start from are not a complete, finite stack of blocks")]
+    Start,
+    /// A part of the input does not fit the mesh.
+    #[error("{what} has {found} numbers where the mesh of {vertex_count} vertices asks for {expected}")]
+    Input {
+        /// Which part.
+        what: &'static str,
+        /// Its length.
+        found: usize,
+        /// What was needed.
+        expected: usize,
+        /// V.
+        vertex_count: usize,
+    },
+    /// A setting is outside its range.
+    #[error("the training setting `{name}` is out of range: {rule}")]
+    Setting {
+        /// Which setting.
+        name: &'static str,
+        /// What it must be.
+        rule: &'static str,
+    },
+    /// The batch source ended before the fit did.
+    #[error("no shapes came for step {step}: their source stopped early")]
+    NoBatch {
+        /// The step that waited.
+        step: usize,
+    },
+    /// A batch is empty or does not fit the mesh.
+    #[error("the shapes of step {step} have {found} numbers, not a positive multiple of {shape_len}")]
+    Batch {
+        /// The step.
+        step: usize,
+        /// Length of the batch.
+        found: usize,
+        /// 9 V.
+        shape_len: usize,
+    },
+    /// The loss keeps overflowing.
+    #[error(
+        "the loss stopped being a number {rollbacks} times, last at step {step}: lower the learning rate, or look for broken shapes"
+    )]
+    Diverged {
+        /// The step at which the fit gave up.
+        step: usize,
+        /// Returns to the best weights.
+        rollbacks: u32,
+    },
+    /// A checkpoint cannot be read or written.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+}
+
+/// All that changes during a fit and that a checkpoint keeps, except the optimiser's moments.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct FitState {
+    pub(super) weights: StackWeights,
+    pub(super) best: StackWeights,
+    pub(super) best_validation: Option<f32>,
+    pub(super) best_step: usize,
+    pub(super) step: usize,
+    /// Validations since the best.
+    pub(super) stale: usize,
+    pub(super) rate_scale: f32,
+    pub(super) rollbacks: u32,
+    pub(super) seconds: f64,
+    pub(super) history: Vec<HistoryPoint>,
+}
+
+/// Trains `start`. Deterministic for the same input, settings and batches, whatever the number of threads, unless a time
+/// budget or the observer ends it. With a checkpoint path, an existing file there is resumed (its caller removes it to
+/// start over) and the state is written there now and then and at the end.
+/// Errors: input that does not fit, a loss that keeps overflowing, a checkpoint of another fit or that cannot be written.
+pub fn fit(
+    input: &FitInput<'_>,
+    start: StackWeights,
+    settings: &FitSettings,
+    batches: &mut dyn BatchSource,
+    validate: &mut dyn FnMut(&StackWeights) -> f32,
+    observer: &mut dyn FnMut(&FitProgress) -> Flow,
+    checkpoints: Option<&Path>,
+) -> Result<FitOutcome, TrainingError> {
+    check(input, &start, settings)?;
+    let identity = checkpoint::identity(input, settings, &start);
+    let resumed = match checkpoints {
+        Some(path) if path.exists() => Some(checkpoint::read(path, identity, &start)?),
+        _ => None,
+    };
+    let (state, stepper) = match resumed {
+        Some((state, moments)) => (state, Stepper::restore(moments)),
+        None => (first_state(start, settings, validate), Stepper::new()),
+    };
+    let first_step = state.step;
+    let mut run = Run {
+        kernel: Kernel::new(
+            RingMean::new(input.topology),
+            input.vertex_weights,
+            input.position_modes,
+        ),
+        regions: SparsityRegions::new(input.distances),
+        settings,
+        rate: settings
+            .rate
+            .unwrap_or(RATE_TIMES_ROOT_V / (input.topology.vertex_count as f32).sqrt()),
+        state,
+        stepper,
+        checkpoint: checkpoints.map(|path| (path.to_path_buf(), identity)),
+        begun: Instant::now(),
+    };
+    let (sender, receiver) = bounded(1);
+    let stop_reason = std::thread::scope(|scope| {
+        scope.spawn(move || {
+            // A closed channel means that the fit ended first.
+            (first_step..settings.steps).try_for_each(|step| sender.send(batches.batch(step)))
+        });
+        run.steps(receiver, validate, observer)
+    })?;
+    let state = run.state;
+    Ok(FitOutcome {
+        weights: state.best,
+        best_validation: state.best_validation,
+        best_step: state.best_step,
+        steps_run: state.step,
+        history: state.history,
+        rollbacks: state.rollbacks,
+        stop_reason,
+    })
+}
+
+fn first_state(
+    mut start: StackWeights,
+    settings: &FitSettings,
+    validate: &mut dyn FnMut(&StackWeights) -> f32,
+) -> FitState {
+    if settings.loss.unit_rows {
+        start.normalize_rows();
+    }
+    let best_validation = Some(validate(&start)).filter(|error| error.is_finite());
+    FitState {
+        best: start.clone(),
+        weights: start,
+        best_validation,
+        best_step: 0,
+        step: 0,
+        stale: 0,
+        rate_scale: 1.0,
+        rollbacks: 0,
+        seconds: 0.0,
+        history: Vec::new(),
+    }
+}
+
+fn check(input: &FitInput<'_>, start: &StackWeights, settings: &FitSettings) -> Result<(), TrainingError> {
+    let vertex_count = input.topology.vertex_count;
+    let shape_len = vertex_count * FEATURE_COUNT;
+    if !start.is_consistent() || !start.is_finite() {
+        return Err(TrainingError::Start);
+    }
+    let lengths = [
+        ("the start's C row", start.vertex_count * FEATURE_COUNT, shape_len),
+        ("the list of vertex weights", input.vertex_weights.len(), vertex_count),
+        (
+            "the list of position modes",
+            input.position_modes.len(),
+            input.position_modes.len() / shape_len * shape_len,
+        ),
+    ];
+    for (what, found, expected) in lengths {
+        if found != expected {
+            return Err(TrainingError::Input {
+                what,
+                found,
+                expected,
+                vertex_count,
+            });
+        }
+    }
+    let positive = |value: f32| value.is_finite() && value > 0.0;
+    let rules = [
+        ("validate_every", settings.validate_every > 0, "it must be at least 1"),
+        (
+            "checkpoint_every",
+            settings.checkpoint_every > 0,
+            "it must be at least 1",
+        ),
+        ("rate", settings.rate.is_none_or(positive), "it must be positive"),
+        (
+            "final_share",
+            positive(settings.final_share) && settings.final_share <= 1.0,
+            "it must be in (0, 1]",
+        ),
+    ];
+    match rules.into_iter().find(|(_, holds, _)| !holds) {
+        Some((name, _, rule)) => Err(TrainingError::Setting { name, rule }),
+        None => Ok(()),
+    }
+}
+
+struct Run<'a> {
+    kernel: Kernel,
+    regions: SparsityRegions<'a>,
+    settings: &'a FitSettings,
+    rate: f32,
+    state: FitState,
+    stepper: Stepper,
+    checkpoint: Option<(PathBuf, u64)>,
+    begun: Instant,
+}
+
+impl Run<'_> {
+    fn steps(
+        &mut self,
+        batches: Receiver<Vec<f32>>,
+        validate: &mut dyn FnMut(&StackWeights) -> f32,
+        observer: &mut dyn FnMut(&FitProgress) -> Flow,
+    ) -> Result<StopReason, TrainingError> {
+        let earlier_seconds = self.state.seconds;
+        let patience = self.settings.patience;
+        let exhausted = |state: &FitState| patience > 0 && state.stale >= patience;
+        let stop_reason = loop {
+            if exhausted(&self.state) {
+                break StopReason::NoImprovement;
+            }
+            if self.state.step >= self.settings.steps {
+                break StopReason::Finished;
+            }
+            if self
+                .settings
+                .time_budget_s
+                .is_some_and(|budget| self.state.seconds >= budget)
+            {
+                break StopReason::OutOfTime;
+            }
+            let step = self.state.step;
+            let batch = batches.recv().map_err(|_| TrainingError::NoBatch { step })?;
+            let loss = self.step(&batch)?;
+            let validation = self.validate(validate);
+            self.state.seconds = earlier_seconds + self.begun.elapsed().as_secs_f64();
+            self.state.history.push(HistoryPoint {
+                step: self.state.step,
+                loss,
+                validation,
+            });
+            let flow = observer(&FitProgress {
+                step: self.state.step,
+                steps: self.settings.steps,
+                loss,
+                validation,
+                best: self.state.best_validation,
+                seconds: self.state.seconds,
+                rollbacks: self.state.rollbacks,
+            });
+            if flow == Flow::Stop {
+                break StopReason::Stopped;
+            }
+            if self.state.step.is_multiple_of(self.settings.checkpoint_every) {
+                self.save()?;
+            }
+        };
+        self.save()?;
+        Ok(stop_reason)
+    }
+
+    /// One step, or a return to the best weights where the loss or its gradient is not finite.
+    fn step(&mut self, batch: &[f32]) -> Result<LossTerms, TrainingError> {
+        let (settings, state) = (self.settings, &mut self.state);
+        let shape_len = state.weights.vertex_count * FEATURE_COUNT;
+        if batch.is_empty() || !batch.len().is_multiple_of(shape_len) {
+            return Err(TrainingError::Batch {
+                step: state.step,
+                found: batch.len(),
+                shape_len,
+            });
+        }
+        let outside = match settings.loss.sparsity_weight {
+            0.0 => Vec::new(),
+            _ => self.regions.outside(&state.weights, &settings.loss),
+        };
+        let (loss, gradient) = self
+            .kernel
+            .differentiate(&state.weights, batch, &outside, &settings.loss);
+        let progress = state.step as f32 / settings.steps as f32;
+        let rate = f64::from(self.rate * state.rate_scale * settings.final_share.powf(progress));
+        let mut sound = loss.sum().is_finite() && gradient.is_finite();
+        if sound {
+            let component_rate = rate * f64::from(settings.component_rate_factor);
+            let convolution_rate = rate * f64::from(settings.convolution_rate_factor);
+            self.stepper
+                .step(&mut state.weights, &gradient, component_rate, convolution_rate);
+            if settings.loss.unit_rows {
+                state.weights.normalize_rows();
+            }
+            sound = state.weights.is_finite();
+        }
+        state.step += 1;
+        if !sound {
+            state.rollbacks += 1;
+            if state.rollbacks > ROLLBACK_LIMIT {
+                return Err(TrainingError::Diverged {
+                    step: state.step,
+                    rollbacks: state.rollbacks,
+                });
+            }
+            state.rate_scale *= 0.5;
+            state.weights.clone_from(&state.best);
+            self.stepper = Stepper::new();
+        }
+        Ok(loss)
+    }
+
+    /// Measures the validation error where it is due, and keeps the best weights.
+    fn validate(&mut self, validate: &mut dyn FnMut(&StackWeights) -> f32) -> Option<f32> {
+        let state = &mut self.state;
+        if !state.step.is_multiple_of(self.settings.validate_every) && state.step != self.settings.steps {
+            return None;
+        }
+        let error = Some(validate(&state.weights)).filter(|error| error.is_finite());
+        state.stale += 1;
+        if error.is_some_and(|error| state.best_validation.is_none_or(|best| error < best)) {
+            state.best_validation = error;
+            state.best_step = state.step;
+            state.best.clone_from(&state.weights);
+            state.stale = 0;
+        }
+        error
+    }
+
+    fn save(&self) -> Result<(), TrainingError> {
+        if let Some((path, identity)) = &self.checkpoint {
+            checkpoint::write(path, *identity, &self.state, self.stepper.state().as_ref())?;
+        }
+        Ok(())
+    }
+}
