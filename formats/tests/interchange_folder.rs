@@ -42,6 +42,11 @@ fn no_sequence_at_all() {
         refused(&[("a.obj", TRIANGLE)]),
         SequenceError::OneShapeOnly { .. }
     ));
+    let outer = tempfile::tempdir().unwrap();
+    fs::create_dir(outer.path().join("empty")).unwrap();
+    write_sequence_obj(&outer.path().join("text"), &sequence()).unwrap();
+    let error = read(outer.path()).unwrap_err();
+    assert!(error.to_string().ends_with("text?"), "{error}");
     let folder = folder(&[("a.obj", TRIANGLE), ("a.txt", "")]);
     assert!(matches!(
         read(&folder.path().join("b")),

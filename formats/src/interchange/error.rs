@@ -56,12 +56,15 @@ pub enum SequenceError {
     },
     /// The folder holds no mesh file and no positions.npy.
     #[error(
-        "{}: no shapes in this folder; it needs OBJ, PLY or OFF files, one a shape, or positions.npy and faces.npy",
-        path.display()
+        "{}: no shapes in this folder; it needs OBJ, PLY or OFF files, one a shape, or positions.npy and faces.npy{}",
+        path.display(),
+        nearby.as_ref().map(|folder| format!("; did you mean {}?", folder.display())).unwrap_or_default()
     )]
     EmptyFolder {
         /// The folder.
         path: PathBuf,
+        /// A folder inside it that does hold shapes.
+        nearby: Option<PathBuf>,
     },
     /// The folder holds mesh files of two kinds.
     #[error(

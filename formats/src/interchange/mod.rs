@@ -8,6 +8,7 @@
 //! claims, and recurse over header text.
 
 mod error;
+mod folder;
 mod mesh;
 mod notice;
 mod npy;

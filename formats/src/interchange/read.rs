@@ -1,6 +1,7 @@
 //! Reads a mesh sequence: finds the files, parses them in natural order, and refuses what is no sequence.
 
 use super::error::SequenceError;
+use super::folder::{Folder, file_name};
 use super::mesh::{MeshKind, PolygonMesh};
 use super::notice::Notice;
 use super::npy::NpyArray;
@@ -8,7 +9,7 @@ use super::order::{EdgeOrder, diagonal};
 use super::sequence::MeshSequence;
 use super::triangulate::triangulate;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Corners of a face that are quoted when it differs.
 const QUOTED_CORNERS_MAX: usize = 8;
@@ -89,45 +90,6 @@ pub fn read_sequence(path: &Path, progress: &mut dyn FnMut(usize, usize)) -> Res
     })
 }
 
-/// The files of a folder.
-struct Folder {
-    /// Mesh files, all of one kind or the folder is refused; in natural order.
-    files: Vec<PathBuf>,
-    /// Names of the others, sorted.
-    others: Vec<String>,
-}
-
-impl Folder {
-    fn list(path: &Path) -> Result<Folder, SequenceError> {
-        let io = |source| SequenceError::Io {
-            path: path.to_path_buf(),
-            source,
-        };
-        let mut folder = Folder {
-            files: Vec::new(),
-            others: Vec::new(),
-        };
-        for entry in fs::read_dir(path).map_err(io)? {
-            let file = entry.map_err(io)?.path();
-            let name = file_name(&file);
-            // Hidden files are leavings of other systems: `._frame1.obj` holds no mesh.
-            if name.starts_with('.') || !file.is_file() {
-                continue;
-            }
-            match MeshKind::of_path(&file) {
-                Some(_) => folder.files.push(file),
-                None => folder.others.push(name),
-            }
-        }
-        folder.files.sort_by(|a, b| {
-            let by_number = natord::compare(&file_name(a), &file_name(b));
-            by_number.then_with(|| a.cmp(b))
-        });
-        folder.others.sort();
-        Ok(folder)
-    }
-}
-
 fn read_files(
     path: &Path,
     folder: Folder,
@@ -136,7 +98,10 @@ fn read_files(
     let Folder { files, others } = folder;
     let path_buf = || path.to_path_buf();
     let Some(first) = files.first() else {
-        return Err(SequenceError::EmptyFolder { path: path_buf() });
+        return Err(SequenceError::EmptyFolder {
+            path: path_buf(),
+            nearby: Folder::nearby(path)?,
+        });
     };
     let kinds: Vec<MeshKind> = files.iter().filter_map(|file| MeshKind::of_path(file)).collect();
     let kind = kinds[0];
@@ -405,11 +370,4 @@ fn finish(
         },
         notices,
     }
-}
-
-fn file_name(path: &Path) -> String {
-    path.file_name()
-        .unwrap_or(path.as_os_str())
-        .to_string_lossy()
-        .into_owned()
 }
