@@ -51,6 +51,16 @@ impl Topology {
     /// Every index in `faces` must be below `rest.len()` and every position finite: the readers and the package's
     /// semantic pass have checked both. A face that names a vertex twice adds no edge. O(V log V).
     pub fn new(faces: &[[u32; 3]], rest: &[[f64; 3]]) -> Topology {
+        Self::build(faces, rest, None)
+    }
+
+    /// The same with known bridges, `[from, to]`, `from < to`, sorted, all below `rest.len()`: those of a package, so that
+    /// its rings are the ones it was trained on. A bridge along an edge of a face adds nothing.
+    pub fn with_bridges(faces: &[[u32; 3]], rest: &[[f64; 3]], bridges: &[[u32; 2]]) -> Topology {
+        Self::build(faces, rest, Some(bridges))
+    }
+
+    fn build(faces: &[[u32; 3]], rest: &[[f64; 3]], known_bridges: Option<&[[u32; 2]]>) -> Topology {
         let vertex_count = rest.len();
         let mut half_edges: Vec<[u32; 2]> = faces
             .iter()
@@ -78,7 +88,14 @@ impl Topology {
         findings.piece_count = piece_count;
         findings.isolated_vertex_count = piece_of.iter().filter(|piece| piece.is_none()).count();
 
-        let bridges = bridge_edges(rest, &piece_of, piece_count);
+        let bridges = match known_bridges {
+            Some(known) => known
+                .iter()
+                .copied()
+                .filter(|bridge| edges.binary_search(bridge).is_err())
+                .collect(),
+            None => bridge_edges(rest, &piece_of, piece_count),
+        };
         edges.extend_from_slice(&bridges);
         let (ring_offsets, ring) = compressed_rings(vertex_count, &edges);
         Topology {
