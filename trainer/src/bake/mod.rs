@@ -1,1 +1,169 @@
-//! From a compact package to a baked one: fold, order, factor.
+//! From a compact package to a baked one: the mesh's matrix is ordered and factored, the decoder's convolution folded
+//! into the components, everything laid out in the order in which a frame reads it.
+//!
+//! Path of data: compact package -> [`Surface`] (rings, weights) -> [`factor`] (order, factor) and [`sparse`] -> [`fold`]
+//! -> baked package, which the runtime opens without allocating.
+
+pub mod factor;
+pub mod fold;
+pub mod sparse;
+mod surface;
+
+use sinew_formats::package::{
+    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, CompactView, OpenError, WriteError, write_baked,
+};
+
+use factor::{AnchoredLaplacian, EliminationOrder, Factor};
+use fold::{FoldFrame, FoldedBlocks, FoldedComponent};
+pub use surface::Surface;
+
+/// Why a package cannot be baked.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BakeError {
+    /// The factor's indices do not fit.
+    #[error("the solver's factor of {vertex_count} vertices does not fit into memory: use a mesh with fewer vertices")]
+    FactorTooLarge {
+        /// V.
+        vertex_count: usize,
+    },
+    /// The matrix is not positive definite.
+    #[error("the Laplacian is singular at vertex {vertex}: the mesh is not connected through faces and bridges")]
+    NotPositive {
+        /// Source index.
+        vertex: usize,
+    },
+    /// The result breaks a rule of the format, as magnitudes beyond f16 or f32 do.
+    #[error("the baked package would be refused")]
+    Refused(#[source] WriteError),
+    /// The bytes are not a compact package.
+    #[error("the package cannot be opened")]
+    Unreadable(#[source] OpenError),
+}
+
+/// Bakes the compact package in `bytes`; see [`bake`].
+/// Errors: those of [`bake`], and [`BakeError::Unreadable`].
+pub fn bake_bytes(bytes: &[u8]) -> Result<AlignedBytes, BakeError> {
+    bake(&CompactView::open(bytes).map_err(BakeError::Unreadable)?)
+}
+
+/// Bakes a compact package; the same bytes give the same bytes, whatever the thread count.
+/// Errors: a mesh that is not one connected graph, or a result that the format cannot hold.
+/// Source: the frame path's design: fold, order (approximate minimum degree), factor in f64, store in f32.
+pub fn bake(package: &CompactView<'_>) -> Result<AlignedBytes, BakeError> {
+    let surface = Surface::of_package(package);
+    let laplacian = surface.laplacian(package.anchor_vertex() as usize);
+    let order = EliminationOrder::new(&laplacian)?;
+    let factor = Factor::new(&laplacian, &order)?;
+    let rings = SolverRings::new(&laplacian, &order);
+    let rest_positions: Vec<[f32; 3]> = order
+        .vertex_from_solver
+        .iter()
+        .map(|&v| package.rest_positions()[v as usize])
+        .collect();
+
+    let folded = fold_package(package, &surface, &order);
+    let component_counts: Vec<usize> = package.blocks().map(|block| block.component_count as usize).collect();
+    let gathered = FoldedBlocks::gather(&folded, &component_counts);
+    let blocks: Vec<BakedBlock> = package
+        .blocks()
+        .zip(gathered.support_offsets.windows(2))
+        .map(|(block, support)| BakedBlock {
+            level: block.level,
+            parent_component: block.parent_component,
+            first_component: block.first_component,
+            component_count: block.component_count,
+            first_support: support[0],
+            support_count: support[1] - support[0],
+            bias: block.decoder.bias,
+        })
+        .collect();
+    let components: Vec<BakedComponent<'_>> = package
+        .components()
+        .zip(&folded)
+        .zip(gathered.entry_offsets.windows(2))
+        .map(|((component, folded), entries)| BakedComponent {
+            name: component.name,
+            block: component.block,
+            minimum: component.minimum,
+            maximum: component.maximum,
+            first_entry: entries[0],
+            entry_count: entries[1] - entries[0],
+            value_scale: folded.value_scale,
+        })
+        .collect();
+    write_baked(&BakedBasis {
+        compact_id: package.content_id(),
+        rest_positions: &rest_positions,
+        faces: package.faces(),
+        solver_from_vertex: &order.solver_from_vertex,
+        vertex_from_solver: &order.vertex_from_solver,
+        ring_offsets: &rings.offsets,
+        ring: &rings.ring,
+        ring_weights: &rings.weights,
+        factor_offsets: &factor.offsets,
+        factor_rows: &factor.rows,
+        factor_values: &factor.values,
+        inverse_pivots: &factor.inverse_pivots,
+        rotation_scale: package.rotation_scale(),
+        stretch_scale: package.stretch_scale(),
+        blocks: &blocks,
+        components: &components,
+        support: &gathered.support,
+        entry_slots: &gathered.entry_slots,
+        entry_values: &gathered.entry_values,
+    })
+    .map_err(BakeError::Refused)
+}
+
+fn fold_package(package: &CompactView<'_>, surface: &Surface, order: &EliminationOrder) -> Vec<FoldedComponent> {
+    let blocks: Vec<_> = package.blocks().collect();
+    let (decoders, value_scales): (Vec<_>, Vec<_>) = package
+        .components()
+        .map(|component| (&blocks[component.block as usize].decoder, component.value_scale))
+        .unzip();
+    let frame = FoldFrame {
+        ring_offsets: &surface.topology.ring_offsets,
+        ring: &surface.topology.ring,
+        solver_from_vertex: &order.solver_from_vertex,
+    };
+    frame.fold(&sparse::unpack_components(package), &decoders, &value_scales)
+}
+
+/// One-rings and their weights in solver order, for the right-hand side.
+struct SolverRings {
+    offsets: Vec<u32>,
+    ring: Vec<u32>,
+    weights: Vec<f32>,
+}
+
+impl SolverRings {
+    fn new(laplacian: &AnchoredLaplacian<'_>, order: &EliminationOrder) -> Self {
+        let mut rings = Self {
+            offsets: vec![0],
+            ring: Vec::new(),
+            weights: Vec::new(),
+        };
+        for &v in &order.vertex_from_solver {
+            let row = laplacian.ring_offsets[v as usize] as usize..laplacian.ring_offsets[v as usize + 1] as usize;
+            let mut entries: Vec<(u32, f32)> = row
+                .map(|e| {
+                    (
+                        order.solver_from_vertex[laplacian.ring[e] as usize],
+                        laplacian.weights[e] as f32,
+                    )
+                })
+                .collect();
+            entries.sort_unstable_by_key(|&(solver, _)| solver);
+            rings.ring.extend(entries.iter().map(|entry| entry.0));
+            rings.weights.extend(entries.iter().map(|entry| entry.1));
+            rings.offsets.push(rings.ring.len() as u32);
+        }
+        rings
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod fixture;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,163 @@
+//! Baking against its definitions: factor against matrix, folded network against unfolded one.
+
+use rayon::ThreadPoolBuilder;
+use sinew_formats::package::{BakedView, CompactView, FEATURE_COUNT};
+
+use super::{fixture, *};
+use crate::evaluate::{FeatureDecoder, StackEncoder};
+
+/// f64 factor stored in f32.
+const FACTOR_TOLERANCE: f64 = 1e-5;
+
+/// Half precision keeps 11 binary digits of each folded value; a vertex sums a handful.
+const HALF_TOLERANCE: f64 = 2e-3;
+
+/// f32 products against f64 ones.
+const SINGLE_TOLERANCE: f64 = 1e-5;
+
+const WEIGHTS: [f64; 7] = [0.8, -0.5, 1.0, 0.3, -0.9, 0.6, 0.4];
+
+#[test]
+fn factor_reproduces_the_laplacian() {
+    let compact = fixture::compact(1, false);
+    let compact = CompactView::open(&compact).unwrap();
+    let baked = bake(&compact).unwrap();
+    let baked = BakedView::open(&baked).unwrap();
+    let vertex_count = baked.vertex_count();
+    let mut lower = vec![vec![0.0_f64; vertex_count]; vertex_count];
+    for column in 0..vertex_count {
+        lower[column][column] = 1.0;
+        for e in baked.factor_offsets()[column] as usize..baked.factor_offsets()[column + 1] as usize {
+            lower[baked.factor_rows()[e] as usize][column] = f64::from(baked.factor_values()[e]);
+        }
+    }
+    let surface = Surface::of_package(&compact);
+    let laplacian = surface.laplacian(compact.anchor_vertex() as usize);
+    let diagonal = laplacian.diagonal();
+    let largest = diagonal.iter().fold(0.0_f64, |largest, &d| largest.max(d));
+    for i in 0..vertex_count {
+        for j in 0..vertex_count {
+            let (v, w) = (baked.vertex_from_solver()[i] as usize, baked.vertex_from_solver()[j]);
+            let expected = match surface.topology.entry(v, w) {
+                Some(entry) => -surface.weights.weights[entry],
+                None if v == w as usize => diagonal[v],
+                None => 0.0,
+            };
+            let product: f64 = (0..vertex_count)
+                .map(|c| lower[i][c] * lower[j][c] / f64::from(baked.inverse_pivots()[c]))
+                .sum();
+            assert!(
+                (product - expected).abs() < FACTOR_TOLERANCE * largest,
+                "{i} {j}: {product} {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn folded_decoder_is_the_unfolded_one() {
+    let bytes = fixture::compact(2, false);
+    let compact = CompactView::open(&bytes).unwrap();
+    let baked = bake(&compact).unwrap();
+    let folded = FeatureDecoder::new(&BakedView::open(&baked).unwrap()).decode_all(&WEIGHTS);
+    let surface = Surface::of_package(&compact);
+    let unfolded = StackEncoder::new(&compact, &surface.topology).decode(&WEIGHTS);
+    let largest = unfolded
+        .as_flattened()
+        .iter()
+        .fold(0.0_f64, |largest, x| largest.max(x.abs()));
+    assert!(largest > 0.1, "the fixture moves nothing: {largest}");
+    for (folded, unfolded) in folded.as_flattened().iter().zip(unfolded.as_flattened()) {
+        assert!(
+            (folded - unfolded).abs() < HALF_TOLERANCE * largest,
+            "{folded} {unfolded}"
+        );
+    }
+}
+
+#[test]
+fn identity_convolution_changes_no_value() {
+    let bytes = fixture::compact(3, true);
+    let compact = CompactView::open(&bytes).unwrap();
+    let baked = bake(&compact).unwrap();
+    let baked = BakedView::open(&baked).unwrap();
+    let components = sparse::unpack_components(&compact);
+    for (k, (component, stored)) in baked.components().zip(&components).enumerate() {
+        let block = baked.block(component.block as usize);
+        assert_eq!(
+            component.entry_count as usize,
+            stored.vertices.len(),
+            "component {k} keeps its support"
+        );
+        for e in component.first_entry as usize..(component.first_entry + component.entry_count) as usize {
+            let solver = baked.support()[(block.first_support + baked.entry_slots()[e]) as usize];
+            let vertex = baked.vertex_from_solver()[solver as usize];
+            let place = stored.vertices.binary_search(&vertex).unwrap();
+            let value: [f32; FEATURE_COUNT] =
+                baked.entry_values()[e].map(|bits| half::f16::from_bits(bits).to_f32() * component.value_scale);
+            assert_eq!(value, stored.values[place], "component {k}, vertex {vertex}");
+        }
+    }
+}
+
+#[test]
+fn runtime_plays_the_folded_features() {
+    let bytes = fixture::compact(4, false);
+    let baked = bake_bytes(&bytes).unwrap();
+    let decoder = FeatureDecoder::new(&BakedView::open(&baked).unwrap());
+    let basis = sinew_runtime::Basis::open(&baked).unwrap();
+    let mut memory = vec![0; sinew_runtime::WorkspaceLayout::for_basis(&basis).unaligned_bytes()];
+    let mut workspace = sinew_runtime::Workspace::new(&basis, &mut memory).unwrap();
+    let mut weights = [0.0; WEIGHTS.len()];
+    let mut controls = sinew_runtime::Controls::new(&basis, &mut weights).unwrap();
+    for (k, &weight) in WEIGHTS.iter().enumerate() {
+        controls.set_unclamped(k, weight as f32).unwrap();
+    }
+    let mut positions = vec![[0.0; 3]; basis.vertex_count()];
+    let frame = sinew_runtime::Frame {
+        basis: &basis,
+        controls: &controls,
+        positions: &mut positions,
+        normals: None,
+    };
+    frame.run(&mut workspace).unwrap();
+    let expected = decoder.decode_all(&WEIGHTS);
+    for (features, &v) in workspace.features().iter().zip(basis.vertex_from_solver()) {
+        for c in 0..FEATURE_COUNT {
+            assert!((f64::from(features[c]) - expected[v as usize][c]).abs() < SINGLE_TOLERANCE);
+        }
+    }
+    let anchor = CompactView::open(&bytes).unwrap().anchor_vertex() as usize;
+    let rest = fixture::mesh().0[anchor];
+    assert!(
+        (0..3).all(|c| (positions[anchor][c] - rest[c]).abs() < 1e-4),
+        "the anchor stays"
+    );
+}
+
+#[test]
+fn same_bytes_on_one_thread_and_on_four() {
+    let bytes = fixture::compact(5, false);
+    let baked_on = |thread_count| {
+        let pool = ThreadPoolBuilder::new().num_threads(thread_count).build().unwrap();
+        pool.install(|| bake_bytes(&bytes)).unwrap()
+    };
+    assert_eq!(baked_on(1), baked_on(4));
+}
+
+#[test]
+fn refusals() {
+    assert!(matches!(bake_bytes(&[0; 16]), Err(BakeError::Unreadable(_))));
+    // Two vertices without an edge: nothing ties the second one down.
+    let apart = AnchoredLaplacian {
+        ring_offsets: &[0, 0, 0],
+        ring: &[],
+        weights: &[],
+        anchor_vertex: 0,
+    };
+    let order = EliminationOrder::new(&apart).unwrap();
+    assert!(matches!(
+        Factor::new(&apart, &order),
+        Err(BakeError::NotPositive { .. })
+    ));
+}

@@ -1,0 +1,184 @@
+//! Weights by Gauss-Newton on positions, through the runtime's decode and solve and its exact derivative (method section
+//! 3, number 3).
+
+use nalgebra::{DMatrix, DVector};
+
+use super::{
+    descent::{DescentSettings, LeastSquares, NormalEquations, descend},
+    player::{PlayError, Player},
+};
+use crate::features::align::{RigidMotion, widened};
+
+/// A few steps; the first two bring most of the gain.
+const DESCENT: DescentSettings = DescentSettings {
+    step_limit: 5,
+    ridge: 1e-4,
+    least_gain: 1e-3,
+};
+
+/// Values summed in f32 before they join the f64 total: keeps the K^2 V products fast and their sums good to six digits.
+const CHUNK: usize = 512;
+
+/// A direction whose norm falls below this share of its length before projection was inside the span already.
+const DEPENDENT: f64 = 1e-6;
+
+/// Weights that bring the played positions nearest to `target`, up to a rigid motion, from `start` (the feature
+/// projection's). Shapes: `target` `[V]`, source order, units of the source; `start` `[K]`. Weights are not clamped.
+/// Errors: those of [`Player::play`] at `start`.
+pub fn project_positions(player: &mut Player<'_>, target: &[[f32; 3]], start: Vec<f64>) -> Result<Vec<f64>, PlayError> {
+    // A start beyond f32 is an error; a step beyond it is merely refused.
+    player.play(&start)?;
+    descend(
+        &mut PositionMisfit {
+            player,
+            target: widened(target),
+        },
+        start,
+        &DESCENT,
+    )
+}
+
+/// Squared distance of played positions from those of one shape, after rigid alignment.
+struct PositionMisfit<'m, 'p> {
+    player: &'m mut Player<'p>,
+    target: Vec<[f64; 3]>,
+}
+
+impl PositionMisfit<'_, '_> {
+    /// Played positions, and what separates them from the target laid onto them.
+    fn residual(&mut self, weights: &[f64]) -> Result<(Vec<[f64; 3]>, Vec<[f64; 3]>), PlayError> {
+        let played = widened(self.player.play(weights)?);
+        let motion = RigidMotion::onto(&played, &self.target);
+        let residual = self.target.iter().zip(&played).map(|(&target, played)| {
+            let aligned = motion.apply(target);
+            core::array::from_fn(|c| aligned[c] - played[c])
+        });
+        Ok((residual.collect(), played))
+    }
+}
+
+impl LeastSquares for PositionMisfit<'_, '_> {
+    type Error = PlayError;
+
+    fn cost(&mut self, weights: &[f64]) -> Result<f64, PlayError> {
+        match self.residual(weights) {
+            Ok((residual, _)) => Ok(residual.as_flattened().iter().map(|x| x * x).sum()),
+            Err(error) if error.is_overflow() => Ok(f64::INFINITY),
+            Err(error) => Err(error),
+        }
+    }
+
+    fn linearise(&mut self, weights: &[f64]) -> Result<NormalEquations, PlayError> {
+        let (residual, played) = self.residual(weights)?;
+        let rigid = rigid_directions(&played);
+        let mut columns = Vec::with_capacity(weights.len());
+        for k in 0..weights.len() {
+            let mut column = vec![[0.0_f32; 3]; played.len()];
+            self.player.differentiate(k, &mut column)?;
+            remove_directions(&rigid, &mut column);
+            columns.push(column);
+        }
+        let right_hand_side = DVector::from_iterator(
+            columns.len(),
+            columns.iter().map(|column| {
+                let values = column.as_flattened().iter().zip(residual.as_flattened());
+                values.map(|(&j, r)| f64::from(j) * r).sum::<f64>()
+            }),
+        );
+        Ok(NormalEquations {
+            matrix: gram_matrix(&columns),
+            right_hand_side,
+        })
+    }
+}
+
+/// Orthonormal displacements that translate and turn `positions`: a motion of the whole is no error, so no weight should
+/// work against it. Up to six; fewer where the positions have no extent.
+fn rigid_directions(positions: &[[f64; 3]]) -> Vec<Vec<[f64; 3]>> {
+    let vertex_count = positions.len() as f64;
+    let mut centre = [0.0; 3];
+    for position in positions {
+        for c in 0..3 {
+            centre[c] += position[c] / vertex_count;
+        }
+    }
+    let translation = |axis: usize| vec![core::array::from_fn(|c| if c == axis { 1.0 } else { 0.0 }); positions.len()];
+    let rotation = |axis: usize| {
+        let (b, c) = ((axis + 1) % 3, (axis + 2) % 3);
+        let turned = positions.iter().map(|p| {
+            let mut direction = [0.0; 3];
+            direction[b] = centre[c] - p[c];
+            direction[c] = p[b] - centre[b];
+            direction
+        });
+        turned.collect::<Vec<[f64; 3]>>()
+    };
+    let mut directions: Vec<Vec<[f64; 3]>> = Vec::new();
+    for mut direction in (0..3).map(translation).chain((0..3).map(rotation)) {
+        let before = norm(&direction);
+        for known in &directions {
+            let share = product(known, &direction);
+            for (x, known) in direction.as_flattened_mut().iter_mut().zip(known.as_flattened()) {
+                *x -= share * known;
+            }
+        }
+        let after = norm(&direction);
+        if after > DEPENDENT * before {
+            direction.as_flattened_mut().iter_mut().for_each(|x| *x /= after);
+            directions.push(direction);
+        }
+    }
+    directions
+}
+
+fn remove_directions(directions: &[Vec<[f64; 3]>], column: &mut [[f32; 3]]) {
+    for direction in directions {
+        let pairs = column.as_flattened().iter().zip(direction.as_flattened());
+        let share: f64 = pairs.map(|(&x, d)| f64::from(x) * d).sum();
+        for (x, d) in column.as_flattened_mut().iter_mut().zip(direction.as_flattened()) {
+            *x -= (share * d) as f32;
+        }
+    }
+}
+
+fn product(a: &[[f64; 3]], b: &[[f64; 3]]) -> f64 {
+    a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| a * b).sum()
+}
+
+fn norm(a: &[[f64; 3]]) -> f64 {
+    product(a, a).sqrt()
+}
+
+/// `J^T J`, lower triangle. Chunk by chunk, so that a chunk of all columns stays in cache.
+fn gram_matrix(columns: &[Vec<[f32; 3]>]) -> DMatrix<f64> {
+    let mut matrix = DMatrix::zeros(columns.len(), columns.len());
+    let row_count = columns.first().map_or(0, |column| column.as_flattened().len());
+    for first in (0..row_count).step_by(CHUNK) {
+        let rows = first..row_count.min(first + CHUNK);
+        for k in 0..columns.len() {
+            let left = &columns[k].as_flattened()[rows.clone()];
+            for l in 0..=k {
+                matrix[(k, l)] += f64::from(dot_f32(left, &columns[l].as_flattened()[rows.clone()]));
+            }
+        }
+    }
+    matrix
+}
+
+/// Eight running sums, so that the compiler may use vector registers; the order of summation is fixed.
+fn dot_f32(a: &[f32], b: &[f32]) -> f32 {
+    let mut sums = [0.0_f32; 8];
+    let (a_lanes, b_lanes) = (a.chunks_exact(8), b.chunks_exact(8));
+    let tail: f32 = a_lanes
+        .remainder()
+        .iter()
+        .zip(b_lanes.remainder())
+        .map(|(a, b)| a * b)
+        .sum();
+    for (a, b) in a_lanes.zip(b_lanes) {
+        for lane in 0..8 {
+            sums[lane] += a[lane] * b[lane];
+        }
+    }
+    sums.iter().sum::<f32>() + tail
+}
