@@ -91,3 +91,126 @@ fn the_content_id_is_the_contents() {
     bytes.as_mut_slice()[..HEADER_BYTES].copy_from_slice(&header.to_bytes());
     assert_eq!(BakedView::open(&bytes).err(), Some(OpenError::ContentIdMismatch));
 }
+
+/// Where a field lies in its archived record.
+macro_rules! places {
+    ($record:ty { $($field:ident),* $(,)? }) => {
+        [$(core::mem::offset_of!($record, $field)),*]
+    };
+}
+
+/// The tables of FORMAT.md, so that neither a field nor a new rkyv moves a byte unseen.
+#[test]
+fn records_lie_as_documented() {
+    use core::mem::{align_of, size_of};
+    type Compact = ArchivedCompactBasis<'static>;
+    type Component = ArchivedComponentRecord<'static>;
+    type Baked = ArchivedBakedBasis<'static>;
+    type Control = ArchivedBakedComponent<'static>;
+    let compact = places!(Compact {
+        rest_positions,
+        faces,
+        bridges,
+        anchor_vertex,
+        rotation_scale,
+        stretch_scale,
+        blocks,
+        components,
+        support_bits,
+        values,
+        provenance,
+        quality,
+    });
+    assert_eq!(compact, [0, 8, 16, 24, 28, 32, 36, 44, 52, 60, 72, 120]);
+    assert_eq!((size_of::<Compact>(), align_of::<Compact>()), (136, 8));
+    let block = places!(ArchivedBlockRecord {
+        level,
+        parent_component,
+        first_component,
+        component_count,
+        encoder,
+        decoder,
+    });
+    assert_eq!(block, [0, 4, 8, 12, 16, 700]);
+    assert_eq!(size_of::<ArchivedBlockRecord>(), 1384);
+    assert_eq!(
+        places!(ArchivedGraphConvRecord { point, neighbour, bias }),
+        [0, 324, 648]
+    );
+    assert_eq!(size_of::<ArchivedGraphConvRecord>(), 684);
+    let component = places!(Component {
+        name,
+        block,
+        centre_vertex,
+        scale,
+        strength,
+        locality,
+        minimum,
+        maximum,
+        value_scale,
+    });
+    assert_eq!(component, [0, 8, 12, 16, 20, 24, 28, 32, 36]);
+    assert_eq!(size_of::<Component>(), 40);
+    let provenance = places!(ArchivedProvenance<'static> { tool, sequence, config, seed, shape_count, train_shapes });
+    assert_eq!(provenance, [0, 8, 16, 24, 32, 36]);
+    assert_eq!(size_of::<ArchivedProvenance<'static>>(), 48);
+    assert_eq!(
+        places!(ArchivedQuality {
+            validation_e_rms,
+            steps,
+            steps_run
+        }),
+        [0, 4, 8]
+    );
+    assert_eq!(size_of::<ArchivedQuality>(), 12);
+    let baked = places!(Baked {
+        compact_id,
+        rest_positions,
+        faces,
+        solver_from_vertex,
+        vertex_from_solver,
+        ring_offsets,
+        ring,
+        ring_weights,
+        factor_offsets,
+        factor_rows,
+        factor_values,
+        inverse_pivots,
+        rotation_scale,
+        stretch_scale,
+        blocks,
+        components,
+        support,
+        entry_slots,
+        entry_values,
+    });
+    assert_eq!(
+        baked,
+        [
+            0, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 108, 112, 120, 128, 136, 144
+        ]
+    );
+    assert_eq!((size_of::<Baked>(), align_of::<Baked>()), (152, 4));
+    let block = places!(ArchivedBakedBlock {
+        level,
+        parent_component,
+        first_component,
+        component_count,
+        first_support,
+        support_count,
+        bias,
+    });
+    assert_eq!(block, [0, 4, 8, 12, 16, 20, 24]);
+    assert_eq!(size_of::<ArchivedBakedBlock>(), 60);
+    let control = places!(Control {
+        name,
+        block,
+        minimum,
+        maximum,
+        first_entry,
+        entry_count,
+        value_scale
+    });
+    assert_eq!(control, [0, 8, 12, 16, 20, 24, 28]);
+    assert_eq!(size_of::<Control>(), 32);
+}

@@ -1,0 +1,117 @@
+//! Which crate may know which: formats <- runtime, formats and runtime <- trainer, all <- tests; and what the runtime
+//! may pull in. An arrow not listed here is a change of architecture.
+
+use std::{collections::BTreeSet, process::Command};
+
+use serde_json::Value;
+use sinew_tests::workspace_folder;
+
+/// `(crate, what it may depend on)`, within the workspace.
+const ARROWS: [(&str, &[&str]); 4] = [
+    ("sinew-formats", &[]),
+    ("sinew-runtime", &["sinew-formats"]),
+    ("sinew-trainer", &["sinew-formats", "sinew-runtime"]),
+    ("sinew-tests", &["sinew-formats", "sinew-runtime", "sinew-trainer"]),
+];
+
+/// Everything that the runtime links, all of it without std.
+const RUNTIME_CLOSURE: [&str; 19] = [
+    "bytecheck",
+    "bytemuck",
+    "cfg-if",
+    "core_detect",
+    "crc",
+    "crc-catalog",
+    "half",
+    "hashbrown",
+    "libm",
+    "munge",
+    "ptr_meta",
+    "rancor",
+    "rend",
+    "rkyv",
+    "simdutf8",
+    "sinew-formats",
+    "sinew-runtime",
+    "xxhash-rust",
+    "zerocopy",
+];
+
+fn cargo(arguments: &[&str]) -> String {
+    let output = Command::new(env!("CARGO"))
+        .args(arguments)
+        .current_dir(workspace_folder())
+        .output()
+        .unwrap();
+    assert!(
+        output.status.success(),
+        "cargo {arguments:?}: {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn no_arrow_but_the_drawn_ones() {
+    let metadata: Value =
+        serde_json::from_str(&cargo(&["metadata", "--offline", "--no-deps", "--format-version", "1"])).unwrap();
+    let packages = metadata["packages"].as_array().unwrap();
+    let names: BTreeSet<&str> = packages
+        .iter()
+        .map(|package| package["name"].as_str().unwrap())
+        .collect();
+    assert_eq!(
+        names,
+        ARROWS.iter().map(|(name, _)| *name).collect(),
+        "members of the workspace"
+    );
+    for package in packages {
+        let name = package["name"].as_str().unwrap();
+        let (_, allowed) = ARROWS.iter().find(|(known, _)| *known == name).unwrap();
+        for dependency in package["dependencies"].as_array().unwrap() {
+            let target = dependency["name"].as_str().unwrap();
+            // A crate may name itself or a crate below it with other features in its own tests.
+            let known = allowed.contains(&target) || !names.contains(target);
+            assert!(known, "{name} must not depend on {target}");
+        }
+    }
+}
+
+#[test]
+fn the_runtime_links_nothing_that_needs_std() {
+    let tree = cargo(&[
+        "tree",
+        "--offline",
+        "-p",
+        "sinew-runtime",
+        "-e",
+        "normal,no-proc-macro",
+        "--prefix",
+        "none",
+    ]);
+    let linked: BTreeSet<&str> = tree.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    assert!(
+        linked.contains("sinew-formats") && linked.contains("rkyv"),
+        "the tree was read: {tree}"
+    );
+    let strange: Vec<_> = linked.iter().filter(|name| !RUNTIME_CLOSURE.contains(name)).collect();
+    assert!(strange.is_empty(), "not known to live without std: {strange:?}");
+}
+
+#[test]
+fn the_cores_switch_nothing_on_that_needs_std() {
+    for package in ["sinew-runtime", "sinew-formats"] {
+        let arguments = [
+            "tree",
+            "--offline",
+            "-p",
+            package,
+            "--no-default-features",
+            "-e",
+            "normal,features,no-proc-macro",
+        ];
+        let tree = cargo(&arguments);
+        let std: Vec<_> = tree.lines().filter(|line| line.contains("feature \"std\"")).collect();
+        assert!(std.is_empty(), "{package}: {std:?}");
+    }
+}
