@@ -15,15 +15,13 @@ const ARROWS: [(&str, &[&str]); 4] = [
 ];
 
 /// Everything that the runtime links, all of it without std.
-const RUNTIME_CLOSURE: [&str; 19] = [
+const RUNTIME_CLOSURE: [&str; 17] = [
     "bytecheck",
     "bytemuck",
     "cfg-if",
-    "core_detect",
     "crc",
     "crc-catalog",
     "half",
-    "hashbrown",
     "libm",
     "munge",
     "ptr_meta",
