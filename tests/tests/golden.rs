@@ -1,7 +1,8 @@
 //! Packages of released format versions: the same bytes are written, they open, and they hold and play what is written
 //! beside them. `UPDATE_GOLDEN=1` writes those of the current version again; a test fails while it is set.
 
-use std::{env, fmt::Write, fs, path::PathBuf};
+use core::fmt::{Debug, Write};
+use std::{env, fs, path::PathBuf};
 
 use sinew_formats::package::{BakedView, CompactView, FORMAT_VERSION, PackageKind, read_package, save_package};
 use sinew_runtime::Basis;
@@ -38,7 +39,7 @@ fn check(version: u16, name: &str, actual: &[u8]) {
 /// One field a line, floats to the last bit.
 fn describe_compact(view: &CompactView<'_>) -> String {
     let mut text = String::new();
-    let mut line = |name: &str, value: &dyn std::fmt::Debug| writeln!(text, "{name} = {value:?}").unwrap();
+    let mut line = |name: &str, value: &dyn Debug| writeln!(text, "{name} = {value:?}").unwrap();
     line("rest_positions", &view.rest_positions());
     line("faces", &view.faces());
     line("bridges", &view.bridges());
@@ -56,7 +57,7 @@ fn describe_compact(view: &CompactView<'_>) -> String {
 
 fn describe_baked(view: &BakedView<'_>) -> String {
     let mut text = String::new();
-    let mut line = |name: &str, value: &dyn std::fmt::Debug| writeln!(text, "{name} = {value:?}").unwrap();
+    let mut line = |name: &str, value: &dyn Debug| writeln!(text, "{name} = {value:?}").unwrap();
     line("compact_id", &view.compact_id());
     line("rest_positions", &view.rest_positions());
     line("faces", &view.faces());
