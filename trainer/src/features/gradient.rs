@@ -20,7 +20,7 @@ pub enum Weighting {
     /// By their cotangent weight, as in the paper; the normal spoke by [`FeatureSettings::normal_weight`].
     #[default]
     Cotangent,
-    /// As the original authors' program: by `g(h)`, `h = 1/2 (cot a + cot b)`, `g = 1 + h` for h > 0 and `exp(h)`
+    /// As the original authors' program: by `sqrt(g(h))`, `h = 1/2 (cot a + cot b)`, `g = 1 + h` for h > 0 and `exp(h)`
     /// otherwise; the normal spoke is 0.3 mean spokes long and weighs 1.
     Published,
 }
@@ -145,8 +145,11 @@ fn spoke_weights(topology: &Topology, rest: &[[f64; 3]], weighting: Weighting) -
         Weighting::Published => {
             let halves = half_cotangents(topology, rest, f64::INFINITY);
             let mean = positive_mean(&halves);
-            let weigh = |half: f64| if half > 0.0 { 1.0 + half } else { half.exp() };
-            halves.iter().map(|half| weigh(half.unwrap_or(mean))).collect()
+            let emphasis = |half: f64| if half > 0.0 { 1.0 + half } else { half.exp() };
+            halves
+                .iter()
+                .map(|half| emphasis(half.unwrap_or(mean)).sqrt())
+                .collect()
         }
     }
 }

@@ -8,3 +8,6 @@ pub mod gradient;
 pub mod polar;
 pub mod reconstruct;
 pub mod scaler;
+
+#[cfg(test)]
+pub(crate) mod data;

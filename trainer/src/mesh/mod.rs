@@ -6,6 +6,7 @@ pub mod geodesic;
 mod nearest;
 pub mod sparse_factor;
 pub mod topology;
+pub mod unfolding;
 
 #[cfg(test)]
 pub(crate) mod shapes;
