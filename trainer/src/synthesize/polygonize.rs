@@ -236,24 +236,33 @@ fn close(positions: Vec<V3>, quads: &[[u32; 4]]) -> Option<Surface> {
 }
 
 impl Surface {
-    /// Evens out the triangles: half-way to the mean of the neighbours, then back onto the surface along the field's gradient.
+    /// Evens out the triangles: along the surface half-way to the mean of the neighbours, then back onto it.
     fn relax(&mut self, field: &(impl Fn(&V3) -> f64 + Sync), probe: f64) {
         for _ in 0..RELAX_COUNT {
             let positions = &self.positions;
             let relaxed = self.rings.par_iter().enumerate().map(|(v, ring)| {
                 let mean = ring.iter().map(|&j| positions[j as usize]).sum::<V3>() / ring.len() as f64;
-                onto(field, positions[v].lerp(&mean, 0.5), probe)
+                let step = (mean - positions[v]) / 2.0;
+                // Across the surface the mean would sink thin tips below their own axis.
+                let normal = gradient(field, &positions[v], probe)
+                    .try_normalize(0.0)
+                    .unwrap_or_else(V3::zeros);
+                onto(field, positions[v] + step - normal * normal.dot(&step), probe)
             });
             self.positions = relaxed.collect();
         }
     }
 }
 
+fn gradient(field: &impl Fn(&V3) -> f64, p: &V3, probe: f64) -> V3 {
+    let slope = |axis: V3| (field(&(p + axis * probe)) - field(&(p - axis * probe))) / (2.0 * probe);
+    V3::new(slope(V3::x()), slope(V3::y()), slope(V3::z()))
+}
+
 /// Two Newton steps towards the zero set.
-fn onto(field: &(impl Fn(&V3) -> f64 + Sync), start: V3, probe: f64) -> V3 {
+fn onto(field: &impl Fn(&V3) -> f64, start: V3, probe: f64) -> V3 {
     (0..2).fold(start, |p, _| {
-        let slope = |axis: V3| (field(&(p + axis * probe)) - field(&(p - axis * probe))) / (2.0 * probe);
-        let gradient = V3::new(slope(V3::x()), slope(V3::y()), slope(V3::z()));
+        let gradient = gradient(field, &p, probe);
         // The soft union's gradient nearly vanishes in tight forks; a step there is worse than none.
         if gradient.norm_squared() < 0.1 {
             p
