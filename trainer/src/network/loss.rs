@@ -10,7 +10,7 @@ use sinew_formats::package::FEATURE_COUNT;
 use super::weights::StackWeights;
 
 /// Softens norms at zero, where they have no gradient. Entries of unit rows are near 0.01: a shift below their rounding.
-const NORM_SOFTENING: f32 = 1e-6;
+pub(crate) const NORM_SOFTENING: f32 = 1e-6;
 
 /// Weights of the loss terms. All norms are summed over vertices with the vertex weights, then averaged over the shapes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

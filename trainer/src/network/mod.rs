@@ -5,4 +5,5 @@ pub mod device;
 pub mod kernel;
 pub mod loss;
 pub mod ring;
+pub mod stack;
 pub mod weights;

@@ -15,6 +15,7 @@ use crate::mesh::topology::Topology;
 use crate::network::kernel::Kernel;
 use crate::network::loss::{LossSettings, LossTerms, SparsityRegions};
 use crate::network::ring::RingMean;
+use crate::network::stack::DifferentiableStack;
 use crate::network::weights::StackWeights;
 
 /// Learning rate times the root of V: 3e-4 at 1,500 vertices, 1.3e-4 at 8,400. Rows of C have unit length, so their
@@ -22,6 +23,17 @@ use crate::network::weights::StackWeights;
 const RATE_TIMES_ROOT_V: f32 = 1.2e-2;
 /// Returns to the best weights before the fit gives up.
 const ROLLBACK_LIMIT: u32 = 8;
+
+/// What computes loss and gradients; both answer the same numbers up to rounding.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Engine {
+    /// The fused kernel on the CPU.
+    #[default]
+    Kernel,
+    /// burn's tensors on the training device.
+    Tensors,
+}
 
 /// How to train.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -45,6 +57,8 @@ pub struct FitSettings {
     pub time_budget_s: Option<f64>,
     /// Steps between two checkpoints.
     pub checkpoint_every: usize,
+    /// What computes loss and gradients.
+    pub engine: Engine,
     /// What to minimise.
     pub loss: LossSettings,
 }
@@ -61,6 +75,7 @@ impl Default for FitSettings {
             patience: 5,
             time_budget_s: None,
             checkpoint_every: 50,
+            engine: Engine::Kernel,
             loss: LossSettings::local(),
         }
     }
@@ -247,11 +262,7 @@ pub fn fit(
     };
     let first_step = state.step;
     let mut run = Run {
-        kernel: Kernel::new(
-            RingMean::new(input.topology),
-            input.vertex_weights,
-            input.position_modes,
-        ),
+        network: Network::new(settings.engine, input),
         regions: SparsityRegions::new(input.distances),
         settings,
         rate: settings
@@ -351,8 +362,40 @@ fn check(input: &FitInput<'_>, start: &StackWeights, settings: &FitSettings) -> 
     }
 }
 
+/// The network behind one of the engines.
+enum Network {
+    Kernel(Box<Kernel>),
+    Tensors(Box<DifferentiableStack>),
+}
+
+impl Network {
+    fn new(engine: Engine, input: &FitInput<'_>) -> Self {
+        let ring = RingMean::new(input.topology);
+        match engine {
+            Engine::Kernel => Self::Kernel(Box::new(Kernel::new(ring, input.vertex_weights, input.position_modes))),
+            Engine::Tensors => {
+                let model = DifferentiableStack::new(&ring, input.vertex_weights, input.position_modes);
+                Self::Tensors(Box::new(model))
+            }
+        }
+    }
+
+    fn differentiate(
+        &mut self,
+        weights: &StackWeights,
+        batch: &[f32],
+        outside: &[Vec<bool>],
+        settings: &LossSettings,
+    ) -> (LossTerms, StackWeights) {
+        match self {
+            Self::Kernel(kernel) => kernel.differentiate(weights, batch, outside, settings),
+            Self::Tensors(model) => model.differentiate(weights, batch, outside, settings),
+        }
+    }
+}
+
 struct Run<'a> {
-    kernel: Kernel,
+    network: Network,
     regions: SparsityRegions<'a>,
     settings: &'a FitSettings,
     rate: f32,
@@ -432,7 +475,7 @@ impl Run<'_> {
             _ => self.regions.outside(&state.weights, &settings.loss),
         };
         let (loss, gradient) = self
-            .kernel
+            .network
             .differentiate(&state.weights, batch, &outside, &settings.loss);
         let progress = state.step as f32 / settings.steps as f32;
         let rate = f64::from(self.rate * state.rate_scale * settings.final_share.powf(progress));

@@ -4,3 +4,5 @@ pub mod checkpoint;
 pub mod data;
 pub mod fit;
 mod optimizer;
+#[cfg(test)]
+mod tests;

@@ -9,6 +9,8 @@ mod backward;
 mod forward;
 mod lanes;
 mod state;
+#[cfg(test)]
+mod tests;
 
 use rayon::prelude::*;
 use sinew_formats::package::FEATURE_COUNT;
