@@ -1,1 +1,3 @@
 //! The peers, trained on the same shapes, for the same table.
+
+pub mod pca;

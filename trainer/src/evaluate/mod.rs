@@ -1,9 +1,13 @@
 //! Quality, measured through the runtime: E_rms, STED, projections.
+//!
+//! Path of data: compact package and sequence -> weights by encoder, feature projection, position projection -> runtime ->
+//! positions -> [`score`] -> [`Evaluation`].
 
 mod ball;
 mod descent;
 mod encoder;
 mod erms;
+mod evaluation;
 mod feature_projection;
 mod player;
 mod position_projection;
@@ -12,8 +16,14 @@ mod sted;
 
 pub use encoder::{Encoding, MASK_FLOOR, StackEncoder};
 pub use erms::NormalisedPair;
+pub use evaluation::{
+    ComponentCounts, Evaluation, EvaluationError, EvaluationInput, MaxPercentageError, Reconstructions, evaluate,
+};
 pub use feature_projection::FeatureDecoder;
 pub use player::{PlayError, Player};
 pub use position_projection::project_positions;
 pub use scores::{ScoreError, Scores, score};
 pub use sted::{Sted, sted};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,310 @@
+//! Evaluates a package on shapes it was not trained on: three ways to find weights, each decoded and solved by the
+//! runtime, scored against the truth (method sections 3 and 4).
+
+use core::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use sinew_formats::{
+    interchange::MeshSequence,
+    package::{BakedView, CompactView, FEATURE_COUNT, OpenError},
+};
+use sinew_runtime::{Basis, Workspace, WorkspaceError, WorkspaceLayout};
+
+use super::{Encoding, FeatureDecoder, PlayError, Player, ScoreError, Scores, StackEncoder, project_positions, score};
+use crate::{
+    bake::{BakeError, Surface, bake},
+    features::{
+        acap::features_of_shape,
+        align::{RigidMotion, widened},
+        gradient::{FeatureSettings, GradientFit},
+        scaler::FeatureScaler,
+    },
+};
+
+/// What is measured, and on what.
+#[derive(Debug, Clone, Copy)]
+pub struct EvaluationInput<'a> {
+    /// A compact package.
+    pub package: &'a [u8],
+    /// The sequence; its connectivity is the package's.
+    pub sequence: &'a MeshSequence,
+    /// Indices of the shapes to measure, in temporal order.
+    pub test_shapes: &'a [usize],
+    /// Settings of the features, those of the training.
+    pub settings: FeatureSettings,
+}
+
+/// The figures, as `sinew evaluate --json` prints them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Evaluation {
+    /// Shapes measured.
+    pub shapes: usize,
+    /// V.
+    pub vertices: usize,
+    /// Components of the package.
+    pub components: ComponentCounts,
+    /// Weights from the network's encoder.
+    pub encoder: Scores,
+    /// Weights by least squares in feature space.
+    pub feature_projection: Scores,
+    /// Weights by Gauss-Newton on positions.
+    pub position_projection: Scores,
+    /// No components at all: features, solve, positions. The floor.
+    pub round_trip: Scores,
+    /// Share of a shape's feature energy that the encoder's reconstruction misses, worst shape.
+    pub max_percentage_error: MaxPercentageError,
+}
+
+/// Components by scale.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ComponentCounts {
+    /// Of the root block.
+    pub coarse: usize,
+    /// Of all blocks below.
+    pub fine: usize,
+}
+
+/// `max_m |X_m - Xhat_m|^2 / |X_m|^2`, network units.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MaxPercentageError {
+    /// Root block alone.
+    pub one_level: f64,
+    /// All levels.
+    pub two_level: f64,
+}
+
+/// The measured shapes, for saving and for pictures. Shape of each: `[N][V]`, source order.
+#[derive(Debug, Clone, Default)]
+pub struct Reconstructions {
+    /// As in the sequence.
+    pub truth: Vec<Vec<[f32; 3]>>,
+    /// Near the reference, like all that follow.
+    pub encoder: Vec<Vec<[f32; 3]>>,
+    /// Near the reference.
+    pub feature_projection: Vec<Vec<[f32; 3]>>,
+    /// Near the reference.
+    pub position_projection: Vec<Vec<[f32; 3]>>,
+    /// Weights of the position projection. Shape: `[N][K]`.
+    pub position_weights: Vec<Vec<f64>>,
+}
+
+/// Why a package cannot be evaluated on a sequence.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum EvaluationError {
+    /// Not a package, or a damaged one.
+    #[error("the package cannot be opened")]
+    Open(#[from] OpenError),
+    /// Not bakeable.
+    #[error("the package cannot be baked")]
+    Bake(#[from] BakeError),
+    /// Another mesh.
+    #[error(
+        "the package has {package} vertices and the sequence {sequence}: evaluate on the sequence it was trained on"
+    )]
+    VertexCount {
+        /// V of the package.
+        package: usize,
+        /// V of the sequence.
+        sequence: usize,
+    },
+    /// Another connectivity.
+    #[error("face {face} of the sequence is not that of the package: evaluate on the sequence it was trained on")]
+    Faces {
+        /// First face that differs.
+        face: usize,
+    },
+    /// No such shape.
+    #[error("there is no shape {shape}: the sequence has {shape_count}")]
+    NoSuchShape {
+        /// The index asked for.
+        shape: usize,
+        /// N.
+        shape_count: usize,
+    },
+    /// The runtime gives up on a shape.
+    #[error("shape {shape} cannot be played")]
+    Play {
+        /// Index in the sequence.
+        shape: usize,
+        /// Why.
+        source: PlayError,
+    },
+    /// No memory for the runtime.
+    #[error("the runtime's workspace cannot be made")]
+    Workspace(#[from] WorkspaceError),
+    /// The results cannot be scored.
+    #[error("the reconstruction cannot be scored")]
+    Score(#[from] ScoreError),
+}
+
+/// Everything found for one shape.
+struct ShapeResult {
+    encoding: Encoding,
+    encoder: Vec<[f32; 3]>,
+    feature_projection: Vec<[f32; 3]>,
+    position_projection: Vec<[f32; 3]>,
+    position_weights: Vec<f64>,
+    round_trip: Vec<[f32; 3]>,
+}
+
+/// Measures. Shapes run in parallel, each on a workspace of its own; the result does not depend on the thread count.
+/// `progress` is called with the number of shapes done, from any thread.
+/// Errors: a damaged package, a sequence of another mesh, a shape index out of range.
+pub fn evaluate(
+    input: &EvaluationInput<'_>,
+    progress: &(dyn Fn(usize) + Sync),
+) -> Result<(Evaluation, Reconstructions), EvaluationError> {
+    let package = CompactView::open(input.package)?;
+    check(input, &package)?;
+    let baked = bake(&package)?;
+    let bench = Bench::new(&package, &baked)?;
+    let surface = &bench.surface;
+    let fit = GradientFit::new(&surface.topology, &surface.rest, &input.settings);
+    let encoder = StackEncoder::new(&package, &surface.topology);
+    let done = AtomicUsize::new(0);
+    let results: Vec<ShapeResult> = input
+        .test_shapes
+        .par_iter()
+        .map(|&m| {
+            let result = bench.measure(&fit, &encoder, m, &input.sequence.shapes[m]);
+            progress(done.fetch_add(1, Ordering::Relaxed) + 1);
+            result
+        })
+        .collect::<Result<_, _>>()?;
+
+    let faces = package.faces();
+    let truth: Vec<Vec<[f32; 3]>> = input
+        .test_shapes
+        .iter()
+        .map(|&m| input.sequence.shapes[m].clone())
+        .collect();
+    let coarse = package
+        .blocks()
+        .filter(|b| b.level == 0)
+        .map(|b| b.component_count as usize)
+        .sum();
+    let worst = |share: fn(&Encoding) -> f64| {
+        let moving = results
+            .iter()
+            .map(|result| &result.encoding)
+            .filter(|encoding| encoding.energy > 0.0);
+        moving
+            .map(|encoding| share(encoding) / encoding.energy)
+            .fold(0.0, f64::max)
+    };
+    let max_percentage_error = MaxPercentageError {
+        one_level: worst(|encoding| encoding.root_residual_energy),
+        two_level: worst(|encoding| encoding.residual_energy),
+    };
+    let mut round_trip = Vec::with_capacity(results.len());
+    let mut found = Reconstructions {
+        truth,
+        ..Reconstructions::default()
+    };
+    for result in results {
+        found.encoder.push(result.encoder);
+        found.feature_projection.push(result.feature_projection);
+        found.position_projection.push(result.position_projection);
+        found.position_weights.push(result.position_weights);
+        round_trip.push(result.round_trip);
+    }
+    let evaluation = Evaluation {
+        shapes: found.truth.len(),
+        vertices: package.vertex_count(),
+        components: ComponentCounts {
+            coarse,
+            fine: package.component_count() - coarse,
+        },
+        encoder: score(&found.truth, &found.encoder, faces)?,
+        feature_projection: score(&found.truth, &found.feature_projection, faces)?,
+        position_projection: score(&found.truth, &found.position_projection, faces)?,
+        round_trip: score(&found.truth, &round_trip, faces)?,
+        max_percentage_error,
+    };
+    Ok((evaluation, found))
+}
+
+fn check(input: &EvaluationInput<'_>, package: &CompactView<'_>) -> Result<(), EvaluationError> {
+    let (expected, actual) = (package.vertex_count(), input.sequence.vertex_count());
+    if expected != actual {
+        return Err(EvaluationError::VertexCount {
+            package: expected,
+            sequence: actual,
+        });
+    }
+    let (faces, known) = (&input.sequence.faces, package.faces());
+    if faces != known {
+        let face = faces.iter().zip(known).take_while(|(a, b)| a == b).count();
+        return Err(EvaluationError::Faces { face });
+    }
+    let shape_count = input.sequence.shape_count();
+    match input.test_shapes.iter().find(|&&shape| shape >= shape_count) {
+        Some(&shape) => Err(EvaluationError::NoSuchShape { shape, shape_count }),
+        None if input.test_shapes.is_empty() => Err(ScoreError::Nothing.into()),
+        None => Ok(()),
+    }
+}
+
+/// What all shapes share.
+struct Bench<'b> {
+    surface: Surface,
+    areas: Vec<f64>,
+    scaler: FeatureScaler,
+    decoder: FeatureDecoder,
+    basis: Basis<'b>,
+    layout: WorkspaceLayout,
+}
+
+impl<'b> Bench<'b> {
+    fn new(package: &CompactView<'_>, baked: &'b [u8]) -> Result<Self, EvaluationError> {
+        let surface = Surface::of_package(package);
+        let areas = surface.topology.vertex_areas(&surface.rest);
+        let scaler = FeatureScaler {
+            rotation_scale: package.rotation_scale(),
+            stretch_scale: package.stretch_scale(),
+        };
+        let decoder = FeatureDecoder::new(&BakedView::open(baked)?);
+        let basis = Basis::open(baked)?;
+        let layout = WorkspaceLayout::for_basis(&basis);
+        Ok(Self {
+            surface,
+            areas,
+            scaler,
+            decoder,
+            basis,
+            layout,
+        })
+    }
+
+    fn measure(
+        &self,
+        fit: &GradientFit<'_>,
+        encoder: &StackEncoder<'_>,
+        shape: usize,
+        positions: &[[f32; 3]],
+    ) -> Result<ShapeResult, EvaluationError> {
+        let wide = widened(positions);
+        let motion = RigidMotion::onto(&self.surface.rest, &wide);
+        let aligned: Vec<[f64; 3]> = wide.iter().map(|&p| motion.apply(p)).collect();
+        let features: Vec<[f32; FEATURE_COUNT]> =
+            self.scaler
+                .to_network(&features_of_shape(&self.surface.topology, fit, &aligned));
+
+        let mut memory = vec![0; self.layout.unaligned_bytes()];
+        let mut player = Player::new(&self.basis, Workspace::new(&self.basis, &mut memory)?);
+        let fail = |source| EvaluationError::Play { shape, source };
+        let encoding = encoder.encode(&features);
+        let feature_weights = self.decoder.project(&features, &self.areas, encoding.weights.clone());
+        let position_weights = project_positions(&mut player, positions, feature_weights.clone()).map_err(fail)?;
+        Ok(ShapeResult {
+            encoder: player.play(&encoding.weights).map_err(fail)?.to_vec(),
+            feature_projection: player.play(&feature_weights).map_err(fail)?.to_vec(),
+            position_projection: player.play(&position_weights).map_err(fail)?.to_vec(),
+            round_trip: player.reconstruct(&features).map_err(fail)?.to_vec(),
+            position_weights,
+            encoding,
+        })
+    }
+}
