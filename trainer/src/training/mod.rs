@@ -4,5 +4,6 @@ pub mod checkpoint;
 pub mod data;
 pub mod fit;
 mod optimizer;
+mod terms;
 #[cfg(test)]
 mod tests;
