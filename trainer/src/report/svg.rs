@@ -120,7 +120,7 @@ pub fn number(x: f64) -> String {
         return if x == 0.0 { "0".to_owned() } else { "–".to_owned() };
     }
     match x.abs() {
-        size if size >= 9999.5 || size < 1e-4 => format!("{x:.2e}"),
+        size if !(1e-4..9999.5).contains(&size) => format!("{x:.2e}"),
         size if size >= 99.95 => format!("{x:.0}"),
         size if size >= 9.995 => format!("{x:.1}"),
         size if size >= 0.9995 => format!("{x:.2}"),
