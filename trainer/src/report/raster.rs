@@ -1,4 +1,4 @@
-//! The rasteriser: which face each sample of a picture sees. A z-buffer over triangles, no more; [`super::shade`] colours it.
+//! The rasteriser: which face each sample of a picture sees. A z-buffer over triangles, no more; `shade` colours it.
 
 use super::color::Linear;
 use super::image::Image;
