@@ -229,11 +229,31 @@ fn bounding_radius(points: &[[f64; 3]]) -> f64 {
 }
 
 #[test]
+fn a_gallop_survives_the_round_trip() {
+    /// What the features alone may lose of the paper's own sequence.
+    const FLOOR: f64 = 0.7;
+    /// Of 1.2 million edges over the 49 shapes; folded ears and hooves keep 90.
+    const WRAPPED_EDGES: usize = 200;
+    let Some(horse) = read_sequence("horse") else { return };
+    let result = round_trip(&horse, &FeatureSettings::default());
+    println!(
+        "horse: E_rms {:.4}, {} wrapped edges, {:.2} s",
+        result.e_rms, result.wrapped_edges, result.seconds
+    );
+    assert!(result.e_rms <= FLOOR);
+    assert!(
+        result.wrapped_edges < WRAPPED_EDGES,
+        "branches spread: {}",
+        result.wrapped_edges
+    );
+}
+
+#[test]
 fn every_sequence_survives_the_round_trip() {
     /// Enough of each to see what the features lose, few enough to be quick.
     const SHAPE_COUNT: usize = 4;
-    /// The worst measured is a coarse walker of few, large triangles, at 3.7; more is a fault.
-    const FLOOR: f64 = 4.5;
+    /// The worst measured is a coarse walker of few, large triangles.
+    const FLOOR: f64 = 4.0;
     for name in SEQUENCES {
         let Some(mut sequence) = read_sequence(name) else {
             return;
@@ -241,6 +261,8 @@ fn every_sequence_survives_the_round_trip() {
         let stride = sequence.shapes.len().div_ceil(SHAPE_COUNT);
         sequence.shapes = sequence.shapes.into_iter().step_by(stride).collect();
         for (weighting, normal_weight) in [
+            (Weighting::Refined, 1.0),
+            (Weighting::Refined, 0.01),
             (Weighting::Cotangent, 0.01),
             (Weighting::Cotangent, 1.0),
             (Weighting::Published, 1.0),
@@ -256,10 +278,7 @@ fn every_sequence_survives_the_round_trip() {
                 "{name} {weighting:?} {normal_weight}: E_rms {:.3}, {} wrapped edges, {:.2} s",
                 result.e_rms, result.wrapped_edges, result.seconds
             );
-            assert!(
-                weighting != Weighting::Cotangent || normal_weight > 0.1 || result.e_rms < FLOOR,
-                "{name}"
-            );
+            assert!(weighting != Weighting::Refined || result.e_rms < FLOOR, "{name}");
         }
     }
 }

@@ -5,6 +5,7 @@
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
+use super::refine::Refinement;
 use crate::mesh::cotangent::{EdgeWeights, half_cotangents, positive_mean};
 use crate::mesh::topology::{Topology, corners, cross, difference, is_flat};
 
@@ -18,8 +19,10 @@ const PUBLISHED_NORMAL_LENGTH: f64 = 0.3;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Weighting {
     /// By their cotangent weight, as in the paper; the normal spoke by [`FeatureSettings::normal_weight`].
-    #[default]
     Cotangent,
+    /// As `Cotangent`, then moved as little as it takes for the solve to give the shape back nearly: see `refine`.
+    #[default]
+    Refined,
     /// As the original authors' program: by `sqrt(g(h))`, `h = 1/2 (cot a + cot b)`, `g = 1 + h` for h > 0 and `exp(h)`
     /// otherwise; the normal spoke is 0.3 mean spokes long and weighs 1.
     Published,
@@ -30,7 +33,7 @@ pub enum Weighting {
 pub struct FeatureSettings {
     /// How spokes weigh.
     pub weighting: Weighting,
-    /// Weight of the normal spoke, one mean spoke long, in mean spoke weights; for [`Weighting::Cotangent`]. Positive:
+    /// Weight of the normal spoke, one mean spoke long, in mean spoke weights; not for [`Weighting::Published`]. Positive:
     /// without it a flat ring says nothing about its normal. Small follows the surface, large resists noise.
     pub normal_weight: f64,
 }
@@ -38,14 +41,14 @@ pub struct FeatureSettings {
 impl Default for FeatureSettings {
     fn default() -> Self {
         FeatureSettings {
-            weighting: Weighting::Cotangent,
-            normal_weight: 0.01,
+            weighting: Weighting::Refined,
+            normal_weight: 1.0,
         }
     }
 }
 
 /// The fit of one mesh, ready for any of its shapes. V vertices.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct GradientFit<'t> {
     topology: &'t Topology,
     /// `w_ij A_i^-1 (r_j - r_i)`, A the ring's moments. Shape: that of [`Topology::ring`].
@@ -55,21 +58,24 @@ pub struct GradientFit<'t> {
     /// Rings that do not determine a gradient, in the order to fill them from their neighbours.
     undetermined: Vec<usize>,
     weighting: Weighting,
+    refinement: Option<Refinement>,
 }
 
 impl<'t> GradientFit<'t> {
-    /// Folds the rest shape into the fit.
+    /// Folds the rest shape into the fit. Where the rest shape's coordinates are too extreme for a factor, the fit goes
+    /// unrefined; the solve refuses such a shape by itself.
     pub fn new(topology: &'t Topology, rest: &[[f64; 3]], settings: &FeatureSettings) -> Self {
         let weights = spoke_weights(topology, rest, settings.weighting);
         let rest_normals = vertex_normals(topology, rest, settings.weighting);
         let mut spokes = vec![Vector3::zeros(); topology.ring.len()];
         let mut normals = vec![Vector3::zeros(); topology.vertex_count];
         let mut determined = vec![false; topology.vertex_count];
+        let mut inverses = vec![Matrix3::zeros(); topology.vertex_count];
         for v in 0..topology.vertex_count {
             let entries = topology.entries_of(v);
             let count = entries.len().max(1) as f64;
             let (length, weight) = match settings.weighting {
-                Weighting::Cotangent => (
+                Weighting::Cotangent | Weighting::Refined => (
                     1.0,
                     settings.normal_weight * weights[entries.clone()].iter().sum::<f64>() / count,
                 ),
@@ -90,14 +96,22 @@ impl<'t> GradientFit<'t> {
                 spokes[entry] = inverse * spoke(topology, rest, v, entry) * weights[entry];
             }
             normals[v] = inverse * normal * (weight * length);
+            inverses[v] = inverse;
         }
         let undetermined = fill_order(topology, &determined);
+        for &v in &undetermined {
+            inverses[v] = Matrix3::zeros();
+        }
+        let refinement = (settings.weighting == Weighting::Refined)
+            .then(|| Refinement::new(topology, rest, weights, inverses).ok())
+            .flatten();
         GradientFit {
             topology,
             spokes,
             normals,
             undetermined,
             weighting: settings.weighting,
+            refinement,
         }
     }
 
@@ -135,13 +149,16 @@ impl<'t> GradientFit<'t> {
             };
             known[v] = true;
         }
+        if let Some(refinement) = &self.refinement {
+            refinement.refine(self.topology, shape, &mut gradients);
+        }
         gradients
     }
 }
 
 fn spoke_weights(topology: &Topology, rest: &[[f64; 3]], weighting: Weighting) -> Vec<f64> {
     match weighting {
-        Weighting::Cotangent => EdgeWeights::new(topology, rest).weights,
+        Weighting::Cotangent | Weighting::Refined => EdgeWeights::new(topology, rest).weights,
         Weighting::Published => {
             let halves = half_cotangents(topology, rest, f64::INFINITY);
             let mean = positive_mean(&halves);
@@ -228,7 +245,11 @@ mod tests {
     /// Rounding of a fit of well-shaped rings.
     const TOLERANCE: f64 = 1e-9;
 
-    const SETTINGS: [FeatureSettings; 3] = [
+    const SETTINGS: [FeatureSettings; 4] = [
+        FeatureSettings {
+            weighting: Weighting::Refined,
+            normal_weight: 1.0,
+        },
         FeatureSettings {
             weighting: Weighting::Cotangent,
             normal_weight: 0.01,

@@ -7,6 +7,7 @@ mod branches;
 pub mod gradient;
 pub mod polar;
 pub mod reconstruct;
+mod refine;
 pub mod scaler;
 
 #[cfg(test)]

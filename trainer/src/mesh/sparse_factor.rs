@@ -56,7 +56,6 @@ impl SparseFactor {
     /// Factor of the matrix with `diagonal` (shape `[V]`) and `off_diagonal` (shape that of [`Topology::ring`], symmetric).
     pub fn new(topology: &Topology, diagonal: &[f64], off_diagonal: &[f64]) -> Result<Self, FactorError> {
         let vertex_count = topology.vertex_count;
-        let too_large = FactorError::TooLarge { vertex_count };
         let mut lower = Vec::with_capacity(vertex_count + off_diagonal.len() / 2);
         for v in 0..vertex_count {
             lower.push(Triplet::new(v, v, diagonal[v]));
@@ -67,7 +66,13 @@ impl SparseFactor {
                 }
             }
         }
-        let matrix = SparseColMat::try_new_from_triplets(vertex_count, vertex_count, &lower).map_err(|_| too_large)?;
+        Self::from_lower(vertex_count, &lower)
+    }
+
+    /// Factor of the matrix whose lower triangle is the sum of `lower`, in a fixed order.
+    pub(crate) fn from_lower(vertex_count: usize, lower: &[Triplet<usize, usize, f64>]) -> Result<Self, FactorError> {
+        let too_large = FactorError::TooLarge { vertex_count };
+        let matrix = SparseColMat::try_new_from_triplets(vertex_count, vertex_count, lower).map_err(|_| too_large)?;
         let parameters = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SIMPLICIAL,
             ..CholeskySymbolicParams::default()
