@@ -1,7 +1,8 @@
 //! Opening a package, carving a workspace and playing allocate nothing, refusals included: counted by the allocator.
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
+use core::alloc::{GlobalAlloc, Layout};
+use core::cell::Cell;
+use std::alloc::System;
 
 use sinew_formats::package::{fixture::tiny_baked, write_baked};
 use sinew_runtime::{
@@ -57,7 +58,7 @@ fn packages() -> [sinew_formats::package::AlignedBytes; 2] {
 
 #[test]
 fn the_counter_counts() {
-    assert_eq!(requests(|| drop(std::hint::black_box(Box::new(1)))), 2);
+    assert_eq!(requests(|| drop(core::hint::black_box(Box::new(1)))), 2);
     assert_eq!(requests(|| ()), 0);
 }
 

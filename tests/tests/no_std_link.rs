@@ -1,7 +1,7 @@
 //! The runtime links into a program that has neither std nor an allocator, and plays the same bits there.
 #![cfg(target_os = "linux")]
 
-use std::error::Error;
+use core::error::Error;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
