@@ -9,8 +9,10 @@
 pub mod bake;
 pub mod baselines;
 pub mod components;
+pub mod config;
 pub mod evaluate;
 pub mod features;
+pub mod learn;
 pub mod mesh;
 pub mod network;
 pub mod report;

@@ -86,9 +86,9 @@ pub struct ComponentRecord<'a> {
     pub strength: f32,
     /// Share of its energy within `scale` of its centre, in [0, 1].
     pub locality: f32,
-    /// Least weight seen on the training shapes; the lower stop of the control.
+    /// Least weight seen on the training shapes and their mixes; the lower stop of the control.
     pub minimum: f32,
-    /// Greatest weight seen on the training shapes; the upper stop of the control.
+    /// Greatest weight seen on the training shapes and their mixes; the upper stop of the control.
     pub maximum: f32,
     /// Multiplies the half-precision values.
     pub value_scale: f32,

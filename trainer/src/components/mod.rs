@@ -1,1 +1,9 @@
-//! Components: closed-form start, extraction from the trained network, removal of redundant ones.
+//! Components: where they start (closed form), what feeds their training (local mixes, position modes), and how they
+//! leave the trained network (extract, prune).
+
+pub mod extract;
+pub mod mix;
+pub mod modes;
+pub mod position_modes;
+pub mod regions;
+pub mod start;

@@ -10,7 +10,7 @@ use crate::{
 
 /// Added to every component's energy at a vertex before masks are normalised, times `1 / V`: where no component of a block
 /// lives, its masks share equally instead of dividing zero by zero. The training uses the same.
-pub const MASK_FLOOR: f64 = 1e-6;
+pub const MASK_FLOOR: f64 = crate::network::kernel::MASK_FLOOR as f64;
 
 /// One value of each feature.
 type Features = [f64; FEATURE_COUNT];

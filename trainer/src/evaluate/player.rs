@@ -70,6 +70,11 @@ impl<'p> Player<'p> {
         Ok(&self.positions)
     }
 
+    /// Decoded features of the positions last played, network units. Shape: `[V]`, solver order.
+    pub fn features(&self) -> &[[f32; FEATURE_COUNT]] {
+        self.workspace.features()
+    }
+
     /// Derivative of the positions last played with respect to the weight of `component`. Shape: `displacement` `[V]`.
     pub fn differentiate(&mut self, component: usize, displacement: &mut [[f32; 3]]) -> Result<(), PlayError> {
         Ok(Tangent {

@@ -4,6 +4,7 @@
 //! entry, once.
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+use serde::{Deserialize, Serialize};
 
 use super::refine::Refinement;
 use crate::mesh::cotangent::{EdgeWeights, half_cotangents, positive_mean};
@@ -16,7 +17,8 @@ const MOMENT_FLOOR: f64 = 1e-7;
 const PUBLISHED_NORMAL_LENGTH: f64 = 0.3;
 
 /// How spokes weigh in the fit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Weighting {
     /// By their cotangent weight, as in the paper; the normal spoke by [`FeatureSettings::normal_weight`].
     Cotangent,
@@ -29,7 +31,8 @@ pub enum Weighting {
 }
 
 /// Settings of the fit.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub struct FeatureSettings {
     /// How spokes weigh.
     pub weighting: Weighting,
@@ -42,7 +45,7 @@ impl Default for FeatureSettings {
     fn default() -> Self {
         FeatureSettings {
             weighting: Weighting::Refined,
-            normal_weight: 1.0,
+            normal_weight: 0.1,
         }
     }
 }
@@ -248,7 +251,7 @@ mod tests {
     const SETTINGS: [FeatureSettings; 4] = [
         FeatureSettings {
             weighting: Weighting::Refined,
-            normal_weight: 1.0,
+            normal_weight: 0.1,
         },
         FeatureSettings {
             weighting: Weighting::Cotangent,
@@ -256,7 +259,7 @@ mod tests {
         },
         FeatureSettings {
             weighting: Weighting::Cotangent,
-            normal_weight: 1.0,
+            normal_weight: 0.1,
         },
         FeatureSettings {
             weighting: Weighting::Published,

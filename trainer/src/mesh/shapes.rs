@@ -14,7 +14,7 @@ pub(crate) fn grid(columns: u32, rows: u32, side: f64) -> Mesh {
         .flat_map(|corner| {
             // Diagonals alternate, so that no direction is favoured.
             let [a, b, c, d] = [corner, corner + 1, corner + across + 1, corner + across];
-            if (corner % across + corner / across) % 2 == 0 {
+            if (corner % across + corner / across).is_multiple_of(2) {
                 [[a, b, c], [a, c, d]]
             } else {
                 [[a, b, d], [b, c, d]]
@@ -42,7 +42,7 @@ pub(crate) fn tube(around: u32, rings: u32, height: f64) -> Mesh {
         .flat_map(|(base, place)| {
             let next = (place + 1) % around;
             let [a, b, c, d] = [base + place, base + next, base + around + next, base + around + place];
-            if (base / around + place) % 2 == 0 {
+            if (base / around + place).is_multiple_of(2) {
                 [[a, b, c], [a, c, d]]
             } else {
                 [[a, b, d], [b, c, d]]

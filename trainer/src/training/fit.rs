@@ -54,6 +54,7 @@ pub fn fit(
     checkpoints: Option<&Path>,
 ) -> Result<FitOutcome, TrainingError> {
     check(input, &start, settings)?;
+    let supports = supports_of(&start);
     let identity = checkpoint::identity(input, settings, &start);
     let resumed = match checkpoints {
         Some(path) if path.exists() => Some(checkpoint::read(path, identity, &start)?),
@@ -63,10 +64,12 @@ pub fn fit(
         Some((state, moments)) => (state, Stepper::restore(moments)),
         None => (first_state(start, settings, validate), Stepper::new()),
     };
+    let supports = settings.keep_supports.then_some(supports);
     let first_step = state.step;
     let mut run = Run {
         network: Network::new(settings.engine, input),
         regions: SparsityRegions::new(input.distances),
+        supports,
         settings,
         rate: settings
             .rate
@@ -116,6 +119,23 @@ fn first_state(
         rollbacks: 0,
         seconds: 0.0,
         history: Vec::new(),
+    }
+}
+
+/// Where the components are not zero, in the order of blocks, then `[K][V]`.
+fn supports_of(weights: &StackWeights) -> Vec<bool> {
+    let rows = weights
+        .blocks()
+        .flat_map(|block| block.components.as_chunks::<FEATURE_COUNT>().0);
+    rows.map(|x| x.iter().any(|&x| x != 0.0)).collect()
+}
+
+fn clear_outside(weights: &mut StackWeights, supports: &[bool]) {
+    let rows = weights
+        .blocks_mut()
+        .flat_map(|block| block.components.as_chunks_mut::<FEATURE_COUNT>().0);
+    for (x, _) in rows.zip(supports).filter(|(_, inside)| !**inside) {
+        *x = [0.0; FEATURE_COUNT];
     }
 }
 
@@ -200,6 +220,8 @@ impl Network {
 struct Run<'a> {
     network: Network,
     regions: SparsityRegions<'a>,
+    /// Where components may differ from zero, in the order of blocks, then `[K][V]`; everywhere where absent.
+    supports: Option<Vec<bool>>,
     settings: &'a FitSettings,
     rate: f32,
     state: FitState,
@@ -281,13 +303,17 @@ impl Run<'_> {
             .network
             .differentiate(&state.weights, batch, &outside, &settings.loss);
         let progress = state.step as f32 / settings.steps as f32;
-        let rate = f64::from(self.rate * state.rate_scale * settings.final_share.powf(progress));
+        let warmth = ((state.step + 1) as f32 / settings.warm_up.max(1) as f32).min(1.0);
+        let rate = f64::from(self.rate * state.rate_scale * warmth * settings.final_share.powf(progress));
         let mut sound = loss.sum().is_finite() && gradient.is_finite();
         if sound {
             let component_rate = rate * f64::from(settings.component_rate_factor);
             let convolution_rate = rate * f64::from(settings.convolution_rate_factor);
             self.stepper
                 .step(&mut state.weights, &gradient, component_rate, convolution_rate);
+            if let Some(supports) = &self.supports {
+                clear_outside(&mut state.weights, supports);
+            }
             if settings.loss.unit_rows {
                 state.weights.normalize_rows();
             }
@@ -317,7 +343,9 @@ impl Run<'_> {
         }
         let error = Some(validate(&state.weights)).filter(|error| error.is_finite());
         state.stale += 1;
-        if error.is_some_and(|error| state.best_validation.is_none_or(|best| error < best)) {
+        // Where nothing can be measured the latest weights are the best known.
+        let unmeasured = error.is_none() && state.best_validation.is_none();
+        if unmeasured || error.is_some_and(|error| state.best_validation.is_none_or(|best| error < best)) {
             state.best_validation = error;
             state.best_step = state.step;
             state.best.clone_from(&state.weights);

@@ -33,6 +33,12 @@ pub struct FitSettings {
     pub convolution_rate_factor: f32,
     /// The rate decays exponentially to this share at the last step, in (0, 1].
     pub final_share: f32,
+    /// Steps over which the rate rises from nothing to its full size: Adam's first steps are as long as any, whatever the
+    /// gradient, and would throw a good start away.
+    pub warm_up: usize,
+    /// Components stay zero at the vertices where they start at zero: what is far from a component cannot creep into it,
+    /// and the package stays as small as its start.
+    pub keep_supports: bool,
     /// Steps between two looks at the validation error.
     pub validate_every: usize,
     /// Validations without improvement after which the fit stops; 0 for never.
@@ -50,11 +56,13 @@ pub struct FitSettings {
 impl Default for FitSettings {
     fn default() -> Self {
         Self {
-            steps: 400,
+            steps: 300,
             rate: None,
             component_rate_factor: 1.0,
             convolution_rate_factor: 0.3,
             final_share: 0.01,
+            warm_up: 20,
+            keep_supports: true,
             validate_every: 20,
             patience: 5,
             time_budget_s: None,
@@ -132,7 +140,7 @@ pub enum StopReason {
 /// What a fit leaves.
 #[derive(Debug, Clone)]
 pub struct FitOutcome {
-    /// The weights with the least validation error, the start included.
+    /// The weights with the least validation error, the start included; the latest where none was ever finite.
     pub weights: StackWeights,
     /// Their validation error, where one was finite.
     pub best_validation: Option<f32>,

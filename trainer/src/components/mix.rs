@@ -1,0 +1,203 @@
+//! Local mixes: training shapes whose distant parts move independently. Stands between the scaled features and both the
+//! closed-form start and the network's batches.
+//!
+//! A handful of poses says nothing about which parts move on their own, so a network that only sees the poses learns
+//! them by heart. A mix lets each soft region follow its own random blend of the poses: near vertices keep moving
+//! together, far ones become independent.
+
+use rand::{Rng, RngCore, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// How mixes are drawn.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct MixSettings {
+    /// Fresh mixes an optimiser step; 0 trains on the shapes themselves, as the paper does.
+    pub per_step: usize,
+    /// Fewest soft regions of a mix.
+    pub regions_min: usize,
+    /// Most soft regions of a mix.
+    pub regions_max: usize,
+    /// Width of a soft region (one standard deviation), as a share of the longest distance along the surface.
+    pub reach: f64,
+    /// Share of mixes that blend whole shapes: one region.
+    pub whole_share: f64,
+}
+
+impl Default for MixSettings {
+    fn default() -> Self {
+        Self {
+            per_step: 16,
+            regions_min: 6,
+            regions_max: 20,
+            reach: 0.14,
+            whole_share: 0.1,
+        }
+    }
+}
+
+/// Draws mixes of M shapes over V vertices.
+#[derive(Debug, Clone)]
+pub struct Mixer {
+    shapes: Vec<Vec<[f32; 9]>>,
+    distances: Vec<Vec<f32>>,
+    settings: MixSettings,
+    seed: u64,
+}
+
+/// One soft region of one mix: its centre, the width of its window, its weight of each shape.
+struct SoftRegion {
+    centre: usize,
+    inverse_two_sigma_squared: f32,
+    blend: Vec<f32>,
+}
+
+impl Mixer {
+    /// Shape: `shapes` is `[M][V][9]` in network units without the reference, `distances` `[candidate centres][V]`, the
+    /// longest being 1.
+    pub fn new(shapes: Vec<Vec<[f32; 9]>>, distances: Vec<Vec<f32>>, settings: MixSettings, seed: u64) -> Self {
+        Self {
+            shapes,
+            distances,
+            settings,
+            seed,
+        }
+    }
+
+    /// Mixes number `first .. first + count`, flat `[count][V][9]`: always the same ones for the same seed, whatever was
+    /// drawn before, so that a resumed run sees what the interrupted one would have seen.
+    pub fn mixes(&self, first: u64, count: usize) -> Vec<f32> {
+        let width = self.shapes.first().map_or(0, |shape| shape.len() * 9);
+        let mut mixes = vec![0.0; count * width];
+        if width > 0 {
+            mixes
+                .par_chunks_mut(width)
+                .enumerate()
+                .for_each(|(i, mix)| self.draw(first + i as u64, mix));
+        }
+        mixes
+    }
+
+    fn draw(&self, number: u64, mix: &mut [f32]) {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
+        rng.set_stream(number);
+        let regions = self.draw_regions(&mut rng);
+        let shape_count = self.shapes.len();
+        let mut window = vec![0.0_f32; regions.len()];
+        let mut blend = vec![0.0_f32; shape_count];
+        for (v, x) in mix.chunks_exact_mut(9).enumerate() {
+            // Relative to the nearest centre, so that a vertex far from all of them still gets weights that sum to one.
+            let mut least = f32::INFINITY;
+            for (w, region) in window.iter_mut().zip(&regions) {
+                let d = self.distances[region.centre][v];
+                *w = d * d * region.inverse_two_sigma_squared;
+                least = least.min(*w);
+            }
+            let mut total = 0.0;
+            for w in &mut window {
+                *w = (least - *w).exp();
+                total += *w;
+            }
+            blend.fill(0.0);
+            for (w, region) in window.iter().zip(&regions) {
+                let share = w / total;
+                if share > 1e-4 {
+                    for (b, a) in blend.iter_mut().zip(&region.blend) {
+                        *b += share * a;
+                    }
+                }
+            }
+            for (b, shape) in blend.iter().zip(&self.shapes) {
+                for (out, value) in x.iter_mut().zip(&shape[v]) {
+                    *out += b * value;
+                }
+            }
+        }
+    }
+
+    fn draw_regions(&self, rng: &mut ChaCha8Rng) -> Vec<SoftRegion> {
+        let shape_count = self.shapes.len();
+        let count = if rng.random::<f64>() < self.settings.whole_share {
+            1
+        } else {
+            rng.random_range(
+                self.settings.regions_min.max(1)..=self.settings.regions_max.max(self.settings.regions_min).max(1),
+            )
+        };
+        let deviation = 1.0 / (shape_count as f32).sqrt();
+        (0..count)
+            .map(|_| {
+                let sigma = self.settings.reach * (rng.random::<f64>() - 0.5).exp();
+                SoftRegion {
+                    centre: rng.random_range(0..self.distances.len()),
+                    inverse_two_sigma_squared: (0.5 / (sigma * sigma)) as f32,
+                    blend: (0..shape_count).map(|_| deviation * standard_normal(rng)).collect(),
+                }
+            })
+            .collect()
+    }
+}
+
+/// One standard normal number (Box and Muller 1958).
+pub(super) fn standard_normal(rng: &mut impl RngCore) -> f32 {
+    let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
+    (radius * (core::f64::consts::TAU * rng.random::<f64>()).cos()) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line_mixer(settings: MixSettings) -> Mixer {
+        let vertex_count = 50;
+        let shape = |seed: usize| {
+            (0..vertex_count)
+                .map(|v| [((v * 7 + seed * 3) % 11) as f32 / 11.0 - 0.5; 9])
+                .collect()
+        };
+        let distances = (0..vertex_count)
+            .map(|c: usize| {
+                (0..vertex_count)
+                    .map(|v| c.abs_diff(v) as f32 / (vertex_count - 1) as f32)
+                    .collect()
+            })
+            .collect();
+        Mixer::new(vec![shape(0), shape(1), shape(2)], distances, settings, 7)
+    }
+
+    #[test]
+    fn mixes_depend_on_their_number_alone() {
+        let mixer = line_mixer(MixSettings::default());
+        let together = mixer.mixes(3, 4);
+        let alone = mixer.mixes(5, 1);
+        assert_eq!(together[2 * 450..3 * 450], alone[..]);
+        assert_ne!(together[..450], alone[..]);
+    }
+
+    #[test]
+    fn one_region_blends_whole_shapes() {
+        let mixer = line_mixer(MixSettings {
+            whole_share: 1.0,
+            ..MixSettings::default()
+        });
+        let mix = mixer.mixes(0, 1);
+        // Shapes repeat with period 11 along the line, so a blend of whole shapes does too.
+        for v in 0..39 {
+            assert!((mix[v * 9] - mix[(v + 11) * 9]).abs() < 1e-5, "vertex {v}");
+        }
+    }
+
+    #[test]
+    fn normal_numbers_have_unit_variance() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let samples: Vec<f32> = (0..20_000).map(|_| standard_normal(&mut rng)).collect();
+        let mean = samples.iter().sum::<f32>() / 20_000.0;
+        let variance = samples.iter().map(|x| (x - mean).powi(2)).sum::<f32>() / 20_000.0;
+        assert!(
+            mean.abs() < 0.03 && (variance - 1.0).abs() < 0.04,
+            "mean {mean}, variance {variance}"
+        );
+    }
+}

@@ -1,0 +1,294 @@
+//! The trainer's configuration: one TOML file, every value with a default, saved with the result.
+
+use serde::{Deserialize, Serialize};
+
+use crate::components::extract::PruneSettings;
+use crate::components::mix::MixSettings;
+use crate::features::gradient::FeatureSettings;
+use crate::training::fit::FitSettings;
+
+/// Everything that decides what a training run learns, apart from the shapes themselves.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct TrainConfig {
+    /// Seed of every random choice.
+    pub seed: u64,
+    /// Components of each level, coarse to fine: `[10, 5]` makes 10 coarse ones with 5 fine ones under each.
+    pub components: Vec<usize>,
+    /// How shapes become features.
+    pub features: FeatureSettings,
+    /// How features are scaled for the network.
+    pub scaling: ScalingSettings,
+    /// How training shapes are mixed.
+    pub mixes: MixSettings,
+    /// The closed-form start.
+    pub start: StartSettings,
+    /// What training asks for, how long and how fast.
+    pub fit: FitSettings,
+    /// What is held out of the training shapes, and what is chosen with it.
+    pub validation: ValidationSettings,
+    /// Which components are kept.
+    pub prune: PruneSettings,
+}
+
+impl Default for TrainConfig {
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            components: vec![10, 5],
+            features: FeatureSettings::default(),
+            scaling: ScalingSettings::default(),
+            mixes: MixSettings::default(),
+            start: StartSettings::default(),
+            fit: FitSettings::default(),
+            validation: ValidationSettings::default(),
+            prune: PruneSettings::default(),
+        }
+    }
+}
+
+/// How features are brought into the network's range.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ScalingSettings {
+    /// Network value of the largest log-rotation of the training shapes, in (0, 0.95].
+    pub rotation_reach: f64,
+    /// Weight of stretch against rotation, in (0, 1]: below 1 helps bodies, 1 suits what really stretches.
+    pub stretch_weight: f64,
+}
+
+impl Default for ScalingSettings {
+    fn default() -> Self {
+        Self {
+            rotation_reach: 0.4,
+            stretch_weight: 0.1,
+        }
+    }
+}
+
+/// The closed-form start.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct StartSettings {
+    /// Mixes that the start is computed from.
+    pub samples: usize,
+    /// k-subspace rounds behind the first clustering.
+    pub rounds: usize,
+    /// Distance at which a root component is cut off, as a share of the longest one.
+    pub root_reach: f32,
+    /// Centres that mixes may choose from, spread over the surface.
+    pub centres: usize,
+    /// Modes of the position term; 0 leaves the term out.
+    pub position_modes: usize,
+}
+
+impl Default for StartSettings {
+    fn default() -> Self {
+        Self {
+            samples: 320,
+            rounds: 10,
+            root_reach: 0.4,
+            centres: 256,
+            position_modes: 40,
+        }
+    }
+}
+
+/// What is held out, and what is chosen with it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ValidationSettings {
+    /// Share of the training shapes (without the reference) that is held out while settings are chosen; 0 holds out none.
+    pub share: f64,
+    /// Fewest training shapes (without the reference) of which some are held out; below, every one is needed, and one or
+    /// two held-out poses say more of themselves than of the settings.
+    pub shapes_min: usize,
+    /// Most shapes held out; more would cost time and say little more.
+    pub shapes_max: usize,
+    /// Mix settings to choose from by held-out error, each `[reach, regions_min, regions_max]`; empty keeps `[mixes]`.
+    pub mix_candidates: Vec<(f64, usize, usize)>,
+    /// Seeds of the closed-form start to choose from, by unseen mixes.
+    pub start_seeds: usize,
+    /// With at most this many training shapes the network is trained once more on all of them, as long as the first
+    /// training found best; with more, the held-out ones are not missed.
+    pub refit_shapes_max: usize,
+}
+
+impl Default for ValidationSettings {
+    fn default() -> Self {
+        Self {
+            share: 0.2,
+            shapes_min: 8,
+            shapes_max: 6,
+            mix_candidates: vec![(0.14, 6, 20), (0.2, 4, 8), (0.4, 2, 4)],
+            start_seeds: 3,
+            refit_shapes_max: 16,
+        }
+    }
+}
+
+/// Why a configuration is refused.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ConfigError {
+    /// Not TOML, an unknown key, or a value of the wrong type.
+    #[error("{0}")]
+    Syntax(#[from] toml::de::Error),
+    /// A value out of its range.
+    #[error("`{key}` is {found}, but must be {expected}")]
+    Range {
+        /// Dotted name of the key.
+        key: &'static str,
+        /// What the file says.
+        found: String,
+        /// What is accepted.
+        expected: &'static str,
+    },
+}
+
+impl TrainConfig {
+    /// Reads TOML and checks every range. Errors: the line and column of what does not parse; the key out of range.
+    pub fn from_toml(text: &str) -> Result<Self, ConfigError> {
+        let config: Self = toml::from_str(text)?;
+        config.check()?;
+        Ok(config)
+    }
+
+    /// The whole configuration as TOML; [`TrainConfig::from_toml`] reads it back unchanged.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).unwrap_or_default()
+    }
+
+    /// Checks every range.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        let check = |ok: bool, key: &'static str, found: &dyn core::fmt::Debug, expected: &'static str| {
+            if ok {
+                Ok(())
+            } else {
+                Err(ConfigError::Range {
+                    key,
+                    found: format!("{found:?}"),
+                    expected,
+                })
+            }
+        };
+        let counts = &self.components;
+        check(
+            (1..=4).contains(&counts.len()),
+            "components",
+            counts,
+            "one to four levels, for example [10, 5]",
+        )?;
+        check(
+            counts.iter().all(|&k| (1..=512).contains(&k)),
+            "components",
+            counts,
+            "counts from 1 to 512",
+        )?;
+        let mut total = 0_usize;
+        let mut width = 1_usize;
+        for &count in counts {
+            width = width.saturating_mul(count);
+            total = total.saturating_add(width);
+        }
+        check(total <= 2048, "components", counts, "at most 2048 components in all")?;
+        let reach = self.scaling.rotation_reach;
+        check(
+            reach > 0.0 && reach <= 0.95,
+            "scaling.rotation_reach",
+            &reach,
+            "in (0, 0.95]",
+        )?;
+        let weight = self.scaling.stretch_weight;
+        check(
+            weight > 0.0 && weight <= 1.0,
+            "scaling.stretch_weight",
+            &weight,
+            "in (0, 1]",
+        )?;
+        let normal = self.features.normal_weight;
+        check(
+            normal > 0.0 && normal <= 100.0,
+            "features.normal_weight",
+            &normal,
+            "in (0, 100]",
+        )?;
+        let mixes = &self.mixes;
+        check(
+            mixes.per_step <= 1024,
+            "mixes.per_step",
+            &mixes.per_step,
+            "at most 1024",
+        )?;
+        check(
+            mixes.reach > 0.0 && mixes.reach <= 10.0,
+            "mixes.reach",
+            &mixes.reach,
+            "in (0, 10]",
+        )?;
+        check(
+            mixes.regions_min >= 1,
+            "mixes.regions_min",
+            &mixes.regions_min,
+            "at least 1",
+        )?;
+        check(
+            mixes.regions_max >= mixes.regions_min,
+            "mixes.regions_max",
+            &mixes.regions_max,
+            "at least regions_min",
+        )?;
+        check(
+            (0.0..=1.0).contains(&mixes.whole_share),
+            "mixes.whole_share",
+            &mixes.whole_share,
+            "in [0, 1]",
+        )?;
+        let start = &self.start;
+        check(
+            (16..=4096).contains(&start.samples),
+            "start.samples",
+            &start.samples,
+            "from 16 to 4096",
+        )?;
+        check(start.rounds <= 100, "start.rounds", &start.rounds, "at most 100")?;
+        check(start.root_reach > 0.0, "start.root_reach", &start.root_reach, "above 0")?;
+        check(
+            (1..=4096).contains(&start.centres),
+            "start.centres",
+            &start.centres,
+            "from 1 to 4096",
+        )?;
+        check(
+            start.position_modes <= 512,
+            "start.position_modes",
+            &start.position_modes,
+            "at most 512",
+        )?;
+        let validation = &self.validation;
+        check(
+            (0.0..=0.5).contains(&validation.share),
+            "validation.share",
+            &validation.share,
+            "in [0, 0.5]",
+        )?;
+        let seeds = validation.start_seeds;
+        check(
+            (1..=16).contains(&seeds),
+            "validation.start_seeds",
+            &seeds,
+            "from 1 to 16",
+        )?;
+        for candidate in &validation.mix_candidates {
+            let ok = candidate.0 > 0.0 && candidate.1 >= 1 && candidate.2 >= candidate.1;
+            check(
+                ok,
+                "validation.mix_candidates",
+                candidate,
+                "[reach > 0, regions_min >= 1, regions_max >= regions_min]",
+            )?;
+        }
+        let entries = self.prune.entries_per_vertex;
+        check(entries > 0.0, "prune.entries_per_vertex", &entries, "above 0")
+    }
+}

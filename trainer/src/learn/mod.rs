@@ -1,0 +1,296 @@
+//! The whole training job: from a sequence to a compact package. Everything the command does between reading files and
+//! writing one is here, so that tests and other programs can do it too.
+//!
+//! Path of data: [`prepare`] (topology, features, distances) -> choose how to mix and where to start, by held-out shapes
+//! ([`hold_out`]) -> fit, and fit again on all shapes where they are few -> [`package`] (extract, prune, measure).
+
+pub mod hold_out;
+pub mod package;
+pub mod prepare;
+pub mod run_folder;
+mod stages;
+
+use core::time::Duration;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use sinew_formats::interchange::MeshSequence;
+use sinew_formats::package::{AlignedBytes, Quality, WriteError};
+
+use crate::bake::BakeError;
+use crate::components::position_modes::{keep_linear_algebra_serial, position_modes};
+use crate::config::TrainConfig;
+use crate::evaluate::PlayError;
+use crate::mesh::sparse_factor::FactorError;
+use crate::training::fit::{FitOutcome, HistoryPoint, TrainingError};
+use hold_out::HeldOut;
+use package::PackageError;
+use prepare::Prepared;
+use run_folder::{Plan, RunFolder, RunFolderError};
+use stages::{Fit, FitBounds, choose, in_words, run_fit};
+
+/// Share of a time budget that choosing a start may take.
+const CHOOSING_SHARE: f64 = 0.25;
+
+/// Hears how the job goes, from any thread, and may ask it to stop.
+pub trait Reporter: Sync {
+    /// A stage of `total` parts begins.
+    fn stage(&self, name: &str, total: u64);
+    /// `done` of its parts are done; `note` says what a user may want to see beside the bar.
+    fn advance(&self, done: u64, note: &str);
+    /// Something that the user should know and can keep.
+    fn notice(&self, text: &str);
+    /// Whether to stop at the next chance.
+    fn stop_requested(&self) -> bool;
+}
+
+/// Hears nothing, never stops.
+pub struct Silent;
+
+impl Reporter for Silent {
+    fn stage(&self, _: &str, _: u64) {}
+    fn advance(&self, _: u64, _: &str) {}
+    fn notice(&self, _: &str) {}
+    fn stop_requested(&self) -> bool {
+        false
+    }
+}
+
+/// What decides how a run goes, but not what an unbounded one learns.
+#[derive(Debug, Clone, Default)]
+pub struct RunOptions {
+    /// Bounds choosing and fitting; `None` runs all steps.
+    pub time_budget: Option<Duration>,
+    /// Where checkpoints are kept, and looked for; `None` keeps none.
+    pub work_folder: Option<PathBuf>,
+}
+
+/// What a run gives.
+#[derive(Debug)]
+pub struct Learned {
+    /// The compact package.
+    pub package: AlignedBytes,
+    /// K, after redundant ones went.
+    pub component_count: usize,
+    /// Redundant components that were removed.
+    pub removed_count: usize,
+    /// The configuration with what was chosen filled in.
+    pub config: TrainConfig,
+    /// Loss and validation by step, of the fit whose weights were kept.
+    pub history: Vec<HistoryPoint>,
+    /// Optimiser steps run in all.
+    pub steps_run: usize,
+    /// Why fitting ended, in words.
+    pub stop_reason: String,
+    /// Held-out E_rms at the start and at its best; `None` where nothing was held out.
+    pub validation: Option<(f32, f32)>,
+}
+
+/// Why a run fails.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LearnError {
+    /// The reporter asked for it; checkpoints are kept.
+    #[error("the run was stopped")]
+    Stopped,
+    /// Too little to learn from.
+    #[error(
+        "{found} training shapes besides the reference: at least {needed} are needed; choose more shapes (--train-every, --train-list)"
+    )]
+    TooFewShapes {
+        /// Shapes other than the reference.
+        found: usize,
+        /// What is needed.
+        needed: usize,
+    },
+    /// All training shapes equal the reference.
+    #[error("no vertex moves in any of the {shapes} training shapes: there is nothing to learn")]
+    NothingMoves {
+        /// N.
+        shapes: usize,
+    },
+    /// The mesh's matrix cannot be factored.
+    #[error("the mesh cannot be solved on: {0}")]
+    Factor(#[from] FactorError),
+    /// The optimiser fails, or its checkpoint does not fit.
+    #[error(transparent)]
+    Training(#[from] TrainingError),
+    /// The run's folder cannot be used.
+    #[error(transparent)]
+    RunFolder(#[from] RunFolderError),
+    /// The learned basis cannot be written or measured.
+    #[error(transparent)]
+    Package(#[from] PackageError),
+}
+
+impl From<BakeError> for LearnError {
+    fn from(error: BakeError) -> Self {
+        Self::Package(error.into())
+    }
+}
+
+impl From<WriteError> for LearnError {
+    fn from(error: WriteError) -> Self {
+        Self::Package(error.into())
+    }
+}
+
+impl From<PlayError> for LearnError {
+    fn from(error: PlayError) -> Self {
+        Self::Package(error.into())
+    }
+}
+
+/// Learns a package from the shapes of `sequence` that `train_shapes` lists (ascending; shape 0 is the reference either way).
+/// The same input, configuration and seed give the same bytes unless `time_budget` cuts the run short.
+pub fn learn(
+    sequence: &MeshSequence,
+    train_shapes: &[usize],
+    config: &TrainConfig,
+    options: &RunOptions,
+    reporter: &dyn Reporter,
+) -> Result<Learned, LearnError> {
+    keep_linear_algebra_serial();
+    let started = Instant::now();
+    let prepared = Prepared::new(sequence, train_shapes, config, reporter)?;
+    let mut folder = RunFolder::open(options.work_folder.as_deref(), &prepared.fingerprint(config))?;
+    let held_out = HeldOut::choose(&prepared, &config.validation);
+    let fit_shapes = held_out.rest_of(prepared.network.len());
+
+    let plan = match folder.plan() {
+        Some(plan) => plan,
+        None => {
+            let deadline = options
+                .time_budget
+                .map(|budget| started + budget.mul_f64(CHOOSING_SHARE));
+            let plan = choose(&prepared, config, &held_out, &fit_shapes, deadline, reporter)?;
+            folder.keep_plan(&plan)?;
+            plan
+        }
+    };
+    let mut config = config.clone();
+    config.mixes = plan.mixes.clone();
+
+    reporter.stage("position modes", 1);
+    let modes = position_modes(
+        &prepared.system,
+        &prepared.scaler,
+        config.start.position_modes,
+        config.seed,
+    );
+    let left = |started: Instant| {
+        options
+            .time_budget
+            .map(|budget| budget.saturating_sub(started.elapsed()))
+    };
+    let refits = !held_out.is_empty() && prepared.network.len() <= config.validation.refit_shapes_max;
+
+    // First fit: with validation where there is some.
+    let first = match plan.first_fit.clone() {
+        Some(first) => first,
+        None => {
+            let budget = left(started).map(|left| if refits { left.mul_f64(0.5) } else { left });
+            let outcome = run_fit(
+                &Fit {
+                    prepared: &prepared,
+                    config: &config,
+                    plan: &plan,
+                    shapes: &fit_shapes,
+                    modes: &modes,
+                },
+                &held_out,
+                FitBounds {
+                    steps: config.fit.steps,
+                    budget,
+                    name: "training",
+                    file: "first.checkpoint",
+                },
+                &folder,
+                reporter,
+            )?;
+            if !refits {
+                return finish(&prepared, &config, sequence, train_shapes, outcome, 0, reporter);
+            }
+            let first = run_folder::FirstFit {
+                best_step: outcome.best_step,
+                steps_run: outcome.steps_run,
+                validation: hold_out::first_and_best(&outcome.history),
+                stop_reason: in_words(outcome.stop_reason).to_owned(),
+            };
+            folder.keep_plan(&Plan {
+                first_fit: Some(first.clone()),
+                ..plan.clone()
+            })?;
+            first
+        }
+    };
+    // Second fit: all shapes, as many steps as the first found best.
+    let mut outcome = run_fit(
+        &Fit {
+            prepared: &prepared,
+            config: &config,
+            plan: &plan,
+            shapes: &(0..prepared.network.len()).collect::<Vec<_>>(),
+            modes: &modes,
+        },
+        &HeldOut::none(),
+        FitBounds {
+            steps: first.best_step,
+            budget: left(started),
+            name: "training on all shapes",
+            file: "second.checkpoint",
+        },
+        &folder,
+        reporter,
+    )?;
+    outcome.best_validation = first.validation.map(|(_, best)| best);
+    let mut learned = finish(
+        &prepared,
+        &config,
+        sequence,
+        train_shapes,
+        outcome,
+        first.steps_run,
+        reporter,
+    )?;
+    learned.validation = first.validation;
+    learned.stop_reason = first.stop_reason;
+    Ok(learned)
+}
+
+fn finish(
+    prepared: &Prepared,
+    config: &TrainConfig,
+    sequence: &MeshSequence,
+    train_shapes: &[usize],
+    outcome: FitOutcome,
+    earlier_steps: usize,
+    reporter: &dyn Reporter,
+) -> Result<Learned, LearnError> {
+    reporter.stage("packaging", 1);
+    let quality = Quality {
+        validation_e_rms: outcome.best_validation.filter(|e| e.is_finite()).unwrap_or(-1.0),
+        steps: outcome.best_step as u32,
+        steps_run: (outcome.steps_run + earlier_steps) as u32,
+    };
+    let (package, component_count, removed_count) = package::package(
+        prepared,
+        config,
+        &sequence.name,
+        train_shapes,
+        sequence.shape_count(),
+        &outcome.weights,
+        quality,
+    )?;
+    reporter.advance(1, "");
+    Ok(Learned {
+        package,
+        component_count,
+        removed_count,
+        config: config.clone(),
+        validation: hold_out::first_and_best(&outcome.history),
+        history: outcome.history,
+        steps_run: quality.steps_run as usize,
+        stop_reason: in_words(outcome.stop_reason).to_owned(),
+    })
+}

@@ -1,0 +1,223 @@
+//! From trained weights to the compact package: extraction, ranges from the training shapes, redundancy and strength
+//! measured through the runtime, then the bytes.
+
+use rayon::prelude::*;
+use sinew_formats::package::{AlignedBytes, CompactView, OpenError, Provenance, Quality, WriteError, write_compact};
+use sinew_runtime::{Basis, Workspace, WorkspaceError, WorkspaceLayout};
+
+use super::prepare::Prepared;
+use super::stages::mixer;
+use crate::bake::{BakeError, Surface, bake};
+use crate::components::extract::LearnedBasis;
+use crate::config::TrainConfig;
+use crate::evaluate::{PlayError, Player, ScoreError, StackEncoder};
+use crate::network::weights::StackWeights;
+
+/// Why a learned basis cannot be packaged or measured.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PackageError {
+    /// The format refuses it.
+    #[error("the package would break a rule of its format: {0}")]
+    Write(#[from] WriteError),
+    /// It cannot be baked.
+    #[error("the package cannot be baked: {0}")]
+    Bake(#[from] BakeError),
+    /// What was just written does not open.
+    #[error("the package does not open: {0}")]
+    Open(#[from] OpenError),
+    /// The runtime has no workspace for it.
+    #[error("no workspace for the package: {0}")]
+    Workspace(#[from] WorkspaceError),
+    /// The runtime does not play it.
+    #[error("the package does not play: {0}")]
+    Play(#[from] PlayError),
+    /// Its quality cannot be scored.
+    #[error("its quality cannot be measured: {0}")]
+    Score(#[from] ScoreError),
+}
+
+/// A compact package without provenance: for measuring while training.
+pub struct Draft(AlignedBytes);
+
+impl Draft {
+    /// Opens it.
+    pub fn view(&self) -> Result<CompactView<'_>, PackageError> {
+        Ok(CompactView::open(&self.0)?)
+    }
+}
+
+impl LearnedBasis {
+    /// Writes a package that says nothing of where it comes from.
+    pub fn write_draft(&self) -> Result<Draft, PackageError> {
+        let provenance = Provenance {
+            tool: "sinew",
+            sequence: "draft",
+            config: "",
+            seed: 0,
+            shape_count: 1,
+            train_shapes: &[0],
+        };
+        let quality = Quality {
+            validation_e_rms: -1.0,
+            steps: 0,
+            steps_run: 0,
+        };
+        Ok(Draft(self.with_records(provenance, quality, write_compact)?))
+    }
+}
+
+/// The basis of `weights` as it would be packaged, before redundant components are removed: ranges known, faint parts cut.
+/// Ranges are those of the given `shapes` of `prepared` and of their mixes.
+pub fn draft(
+    prepared: &Prepared,
+    config: &TrainConfig,
+    weights: &StackWeights,
+    shapes: &[usize],
+) -> Result<LearnedBasis, PackageError> {
+    let reach = &config.fit.loss.sparsity_distances;
+    let distances = |v| prepared.distances(v);
+    let mut basis = LearnedBasis::from_weights(weights, prepared.basis_frame(), reach, &distances);
+    measure_ranges(&mut basis, prepared, config, shapes)?;
+    basis.cut_faint_parts(&config.prune, &distances);
+    Ok(basis)
+}
+
+/// Calls `job` for each item with a player of its thread; results keep the order of the items.
+pub fn with_players<I: Sync, T: Send>(
+    basis: &Basis<'_>,
+    items: &[I],
+    job: impl Fn(&mut Player<'_>, &I) -> Result<T, PlayError> + Sync,
+) -> Result<Vec<T>, PackageError> {
+    let layout = WorkspaceLayout::for_basis(basis);
+    let share = items.len().div_ceil(rayon::current_num_threads()).max(1);
+    let parts: Result<Vec<Vec<T>>, PackageError> = items
+        .par_chunks(share)
+        .map(|items| {
+            let mut memory = vec![0_u8; layout.unaligned_bytes()];
+            let mut player = Player::new(basis, Workspace::new(basis, &mut memory)?);
+            items.iter().map(|item| Ok(job(&mut player, item)?)).collect()
+        })
+        .collect();
+    Ok(parts?.into_iter().flatten().collect())
+}
+
+/// Extracts, measures, prunes and writes. Returns the package, its K, and how many components were redundant.
+pub fn package(
+    prepared: &Prepared,
+    config: &TrainConfig,
+    sequence_name: &str,
+    train_shapes: &[usize],
+    shape_count: usize,
+    weights: &StackWeights,
+    quality: Quality,
+) -> Result<(AlignedBytes, usize, usize), PackageError> {
+    let all: Vec<usize> = (0..prepared.network.len()).collect();
+    let mut basis = draft(prepared, config, weights, &all)?;
+    measure_ranges(&mut basis, prepared, config, &all)?;
+    let changes = measure_strengths(&mut basis, config)?;
+    let removed_count = basis.prune(&changes, &config.prune);
+    basis.order_by_strength();
+    // Masks are shared among the components that are left, so the weights of the rest have moved a little.
+    measure_ranges(&mut basis, prepared, config, &all)?;
+    let component_count = basis.components().count();
+    let numbers: Vec<u32> = train_shapes.iter().map(|&m| m as u32).collect();
+    let config_text = config.to_toml();
+    let provenance = Provenance {
+        tool: concat!("sinew ", env!("CARGO_PKG_VERSION")),
+        sequence: sequence_name,
+        config: &config_text,
+        seed: config.seed,
+        shape_count: shape_count as u32,
+        train_shapes: &numbers,
+    };
+    let bytes = basis.with_records(provenance, quality, write_compact)?;
+    Ok((bytes, component_count, removed_count))
+}
+
+/// Number of the first such mix, far from those that batches and the start see.
+const NUMBER_OF_RANGE_MIXES: u64 = 1 << 41;
+/// Mixes whose weights count for the stops of the controls.
+const RANGE_MIXES: usize = 32;
+
+/// The stops of every control: the least and greatest weight that the encoder finds on the training shapes and on mixes of
+/// them, 0 included. A handful of poses alone would leave most controls one-sided.
+fn measure_ranges(
+    basis: &mut LearnedBasis,
+    prepared: &Prepared,
+    config: &TrainConfig,
+    shapes: &[usize],
+) -> Result<(), PackageError> {
+    let compact = basis.write_draft()?;
+    let view = compact.view()?;
+    let surface = Surface::of_package(&view);
+    let encoder = StackEncoder::new(&view, &surface.topology);
+    let mixes = match config.mixes.per_step {
+        0 => Vec::new(),
+        _ => mixer(prepared, shapes, &config.mixes, config.seed).mixes(NUMBER_OF_RANGE_MIXES, RANGE_MIXES),
+    };
+    let mixes: Vec<&[[f32; 9]]> = mixes.as_chunks::<9>().0.chunks(prepared.rest.len()).collect();
+    let posed = shapes.iter().map(|&m| prepared.network[m].as_slice());
+    let inputs: Vec<&[[f32; 9]]> = posed.chain(mixes).collect();
+    let codes: Vec<Vec<f64>> = inputs.par_iter().map(|shape| encoder.encode(shape).weights).collect();
+    for (k, component) in basis.components_mut().enumerate() {
+        component.minimum = codes.iter().map(|code| code[k] as f32).fold(0.0, f32::min);
+        component.maximum = codes.iter().map(|code| code[k] as f32).fold(0.0, f32::max);
+    }
+    Ok(())
+}
+
+/// Plays every component alone at its farther stop. Sets its strength (mean displacement of what it moves, as a share of
+/// the bounding box) and returns the mean change of features that decides on redundancy (paper: I).
+fn measure_strengths(basis: &mut LearnedBasis, config: &TrainConfig) -> Result<Vec<f32>, PackageError> {
+    let compact = basis.write_draft()?;
+    let baked = bake(&compact.view()?)?;
+    let opened = Basis::open(&baked)?;
+    let stops: Vec<f64> = basis
+        .components()
+        .map(|c| f64::from(if c.maximum >= -c.minimum { c.maximum } else { c.minimum }))
+        .collect();
+    let diagonal = bounding_diagonal(&basis.rest_positions);
+    let numbers: Vec<usize> = (0..stops.len()).collect();
+    let rest = &basis.rest_positions;
+    let moved = config.prune.moved;
+    let measured = with_players(&opened, &numbers, |player, &k| {
+        let mut weights = vec![0.0; stops.len()];
+        weights[k] = stops[k];
+        let positions = player.play(&weights)?.to_vec();
+        let change = mean_above(player.features().iter().map(|x| norm(x)), moved);
+        let displaced = positions
+            .iter()
+            .zip(rest)
+            .map(|(p, r)| norm(&[p[0] - r[0], p[1] - r[1], p[2] - r[2]]) / diagonal);
+        Ok((change, mean_above(displaced, moved)))
+    })?;
+    for (component, (_, strength)) in basis.components_mut().zip(&measured) {
+        component.strength = *strength;
+    }
+    Ok(measured.into_iter().map(|(change, _)| change).collect())
+}
+
+/// Mean of the values above `least`; 0 where there is none.
+fn mean_above(values: impl Iterator<Item = f32>, least: f32) -> f32 {
+    let (sum, count) = values
+        .filter(|&x| x > least)
+        .fold((0.0_f64, 0_usize), |(s, n), x| (s + f64::from(x), n + 1));
+    if count > 0 { (sum / count as f64) as f32 } else { 0.0 }
+}
+
+fn norm(x: &[f32]) -> f32 {
+    x.iter().map(|x| x * x).sum::<f32>().sqrt()
+}
+
+/// Length of the bounding box's diagonal; 1 for a point.
+pub fn bounding_diagonal(positions: &[[f32; 3]]) -> f32 {
+    let squared: f32 = (0..3)
+        .map(|c| {
+            let values = positions.iter().map(|p| p[c]);
+            let extent = values.clone().fold(f32::MIN, f32::max) - values.fold(f32::MAX, f32::min);
+            extent * extent
+        })
+        .sum();
+    if squared > 0.0 { squared.sqrt() } else { 1.0 }
+}

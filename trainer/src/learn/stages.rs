@@ -1,0 +1,270 @@
+//! The stages of a training run: choosing how to mix and where to start, and fits of the network.
+
+use core::time::Duration;
+use std::time::Instant;
+
+use super::hold_out::{HeldOut, encoder_error};
+use super::prepare::Prepared;
+use super::run_folder::{Plan, RunFolder};
+use super::{LearnError, Reporter, package};
+use crate::components::mix::{MixSettings, Mixer};
+use crate::components::start::{StartInput, closed_form_start};
+use crate::config::TrainConfig;
+use crate::network::weights::StackWeights;
+use crate::training::data::{BatchSource, ShapesSource};
+use crate::training::fit::{FitInput, FitOutcome, FitProgress, FitSettings, Flow, StopReason, fit};
+
+/// One fit: what it learns from.
+pub(super) struct Fit<'a> {
+    pub(super) prepared: &'a Prepared,
+    pub(super) config: &'a TrainConfig,
+    pub(super) plan: &'a Plan,
+    pub(super) shapes: &'a [usize],
+    pub(super) modes: &'a [f32],
+}
+
+/// One fit: when it ends and what it is called.
+pub(super) struct FitBounds {
+    pub(super) steps: usize,
+    pub(super) budget: Option<Duration>,
+    pub(super) name: &'static str,
+    pub(super) file: &'static str,
+}
+
+/// The mixes of the chosen shapes.
+pub(super) fn mixer(prepared: &Prepared, shapes: &[usize], settings: &MixSettings, seed: u64) -> Mixer {
+    let network = shapes.iter().map(|&m| prepared.network[m].clone()).collect();
+    Mixer::new(network, prepared.centre_distances.clone(), settings.clone(), seed)
+}
+
+/// Numbers of the mixes that the start sees, far from those that batches see.
+const START_MIXES: u64 = 1 << 40;
+
+/// Number of the first mix that seeds are chosen by, and how many.
+const SEED_MIXES: (u64, usize) = (1 << 42, 12);
+
+/// The closed-form start, its faint parts cut: of `seed_count` seeds the one that plays unseen mixes best.
+fn start(
+    prepared: &Prepared,
+    config: &TrainConfig,
+    shapes: &[usize],
+    mixes: &MixSettings,
+    seed_count: usize,
+    reporter: &dyn Reporter,
+) -> Result<StackWeights, LearnError> {
+    let unseen = mixer(prepared, shapes, mixes, config.seed).mixes(SEED_MIXES.0, SEED_MIXES.1);
+    let unseen: Vec<&[[f32; 9]]> = unseen.as_chunks::<9>().0.chunks(prepared.rest.len()).collect();
+    let mut best: Option<(f32, StackWeights)> = None;
+    for i in 0..seed_count as u64 {
+        if reporter.stop_requested() {
+            return Err(LearnError::Stopped);
+        }
+        let weights = start_of_seed(prepared, config, shapes, mixes, config.seed.wrapping_add(i))?;
+        if seed_count == 1 {
+            return Ok(weights);
+        }
+        let basis = package::draft(prepared, config, &weights, shapes)?;
+        let error = encoder_error(&basis, &unseen, None)?;
+        if best.as_ref().is_none_or(|(least, _)| error < *least) {
+            best = Some((error, weights));
+        }
+        reporter.advance(i + 1, "");
+    }
+    best.map(|(_, weights)| weights).ok_or(LearnError::Stopped)
+}
+
+fn start_of_seed(
+    prepared: &Prepared,
+    config: &TrainConfig,
+    shapes: &[usize],
+    mixes: &MixSettings,
+    seed: u64,
+) -> Result<StackWeights, LearnError> {
+    let samples = mixer(prepared, shapes, mixes, seed).mixes(START_MIXES, config.start.samples);
+    let input = StartInput {
+        topology: &prepared.topology,
+        rest: &prepared.rest,
+        samples: &samples,
+        component_counts: &config.components,
+        root_reach: config.start.root_reach,
+        rounds: config.start.rounds,
+        seed,
+    };
+    let mut weights = closed_form_start(&input, &|v| prepared.distances(v));
+    // The supports that the fit keeps are those of the package.
+    let cut = package::draft(prepared, config, &weights, shapes)?;
+    let rows = weights.levels.iter_mut().flat_map(|level| &mut level.blocks);
+    for (block, cut) in rows.zip(&cut.blocks) {
+        block.components = cut
+            .components
+            .iter()
+            .flat_map(|component| component.row.as_flattened())
+            .copied()
+            .collect();
+    }
+    Ok(weights)
+}
+
+/// Chooses how to mix by the error on the held-out shapes.
+pub(super) fn choose(
+    prepared: &Prepared,
+    config: &TrainConfig,
+    held_out: &HeldOut,
+    fit_shapes: &[usize],
+    deadline: Option<Instant>,
+    reporter: &dyn Reporter,
+) -> Result<Plan, LearnError> {
+    let mut best = Plan {
+        mixes: config.mixes.clone(),
+        first_fit: None,
+    };
+    if held_out.is_empty() || config.mixes.per_step == 0 {
+        return Ok(best);
+    }
+    let mut candidates: Vec<MixSettings> = config
+        .validation
+        .mix_candidates
+        .iter()
+        .map(|&(reach, regions_min, regions_max)| MixSettings {
+            reach,
+            regions_min,
+            regions_max,
+            ..config.mixes.clone()
+        })
+        .collect();
+    if candidates.is_empty() {
+        candidates.push(config.mixes.clone());
+    }
+    reporter.stage("choosing how to mix", candidates.len() as u64);
+    let mut least = f32::INFINITY;
+    for (i, mixes) in candidates.into_iter().enumerate() {
+        let weights = start(prepared, config, fit_shapes, &mixes, 1, reporter)?;
+        let error = held_out.error(prepared, config, &weights)?;
+        if error < least {
+            least = error;
+            best = Plan { mixes, first_fit: None };
+        }
+        reporter.advance(i as u64 + 1, &format!("held-out E_rms {least:.2}"));
+        if deadline.is_some_and(|deadline| Instant::now() > deadline) {
+            break;
+        }
+    }
+    Ok(best)
+}
+
+pub(super) fn run_fit(
+    job: &Fit<'_>,
+    held_out: &HeldOut,
+    bounds: FitBounds,
+    folder: &RunFolder,
+    reporter: &dyn Reporter,
+) -> Result<FitOutcome, LearnError> {
+    let Fit {
+        prepared,
+        config,
+        plan,
+        shapes,
+        modes,
+    } = *job;
+    reporter.stage("starting", config.validation.start_seeds as u64);
+    let weights = start(
+        prepared,
+        config,
+        shapes,
+        &plan.mixes,
+        config.validation.start_seeds,
+        reporter,
+    )?;
+    let mut batches: Box<dyn BatchSource> = if config.mixes.per_step > 0 {
+        let mixer = mixer(prepared, shapes, &plan.mixes, config.seed);
+        Box::new(MixBatches {
+            mixer,
+            per_step: config.mixes.per_step,
+        })
+    } else {
+        Box::new(ShapesSource::new(
+            shapes
+                .iter()
+                .flat_map(|&m| prepared.network[m].as_flattened())
+                .copied()
+                .collect(),
+        ))
+    };
+    let distances = |v: usize| prepared.distances(v);
+    let input = FitInput {
+        topology: &prepared.topology,
+        vertex_weights: &prepared.areas,
+        position_modes: modes,
+        distances: &distances,
+    };
+    let settings = FitSettings {
+        time_budget_s: bounds.budget.map(|budget| budget.as_secs_f64()),
+        ..config.fit.clone()
+    };
+    reporter.stage(bounds.name, bounds.steps as u64);
+    let mut failure = None;
+    let mut validate = |weights: &StackWeights| {
+        if held_out.is_empty() {
+            return f32::NAN;
+        }
+        held_out.error(prepared, config, weights).unwrap_or_else(|error| {
+            failure = Some(error);
+            f32::NAN
+        })
+    };
+    let mut observe = |progress: &FitProgress| {
+        let mut note = format!("loss {:.4}", progress.loss.sum());
+        if let Some(best) = progress.best {
+            note += &format!(", held-out E_rms {best:.2}");
+        }
+        reporter.advance(progress.step as u64, &note);
+        if reporter.stop_requested() || progress.step >= bounds.steps {
+            Flow::Stop
+        } else {
+            Flow::Continue
+        }
+    };
+    let checkpoint = folder.file(bounds.file);
+    let outcome = fit(
+        &input,
+        weights,
+        &settings,
+        &mut *batches,
+        &mut validate,
+        &mut observe,
+        checkpoint.as_deref(),
+    );
+    if let Some(error) = failure {
+        return Err(error);
+    }
+    let mut outcome = outcome?;
+    if outcome.stop_reason == StopReason::Stopped {
+        if outcome.steps_run < bounds.steps {
+            return Err(LearnError::Stopped);
+        }
+        outcome.stop_reason = StopReason::Finished;
+    }
+    Ok(outcome)
+}
+
+/// Fresh mixes for every step.
+struct MixBatches {
+    mixer: Mixer,
+    per_step: usize,
+}
+
+impl BatchSource for MixBatches {
+    fn batch(&mut self, step: usize) -> Vec<f32> {
+        self.mixer.mixes((step * self.per_step) as u64, self.per_step)
+    }
+}
+
+/// Why a fit ended, for people.
+pub(super) fn in_words(reason: StopReason) -> &'static str {
+    match reason {
+        StopReason::Finished => "all steps done",
+        StopReason::NoImprovement => "held-out error stopped improving",
+        StopReason::OutOfTime => "time budget spent",
+        StopReason::Stopped => "stopped",
+    }
+}
