@@ -164,7 +164,11 @@ impl Report {
             .filter(|folder| !folder.as_os_str().is_empty())
             .unwrap_or(Path::new("."));
         let store = || -> std::io::Result<()> {
-            let mut file = tempfile::NamedTempFile::new_in(folder)?;
+            let mut builder = tempfile::Builder::new();
+            // Temporary files are private by default; a report is to be read by others, as far as the umask lets them.
+            #[cfg(unix)]
+            builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+            let mut file = builder.tempfile_in(folder)?;
             file.write_all(page.as_bytes())?;
             file.persist(path).map_err(|error| error.error)?;
             Ok(())

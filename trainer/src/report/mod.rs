@@ -5,6 +5,7 @@
 
 pub mod color;
 pub mod html;
+pub mod illustrate;
 pub mod image;
 pub mod pictures;
 pub mod raster;

@@ -1,0 +1,150 @@
+//! `sinew train`: a folder of meshes in, one compact package out.
+
+use core::time::Duration;
+use std::path::PathBuf;
+
+use clap::Args;
+use miette::{IntoDiagnostic, WrapErr, miette};
+use sinew_formats::package::save_package;
+use sinew_trainer::config::TrainConfig;
+use sinew_trainer::learn::{LearnError, RunOptions, learn};
+
+use super::console::Console;
+use super::{Failure, check_output, chosen_shapes, load_sequence, parse_duration};
+
+/// Arguments of `sinew train`.
+#[derive(Args)]
+#[command(
+    after_help = "Stopping with Ctrl-C keeps the run beside the output, in OUTPUT.training: the same command with --resume goes on \
+where it stopped, and ends with the same package as if it had never been stopped.
+
+Examples:
+  sinew train scans/ -o face.sinew
+  sinew train walk/ -o walk.sinew --train-every 10 --time-budget 5m
+  sinew train flag/ -o flag.sinew --components 6,4,3"
+)]
+pub struct TrainArguments {
+    /// Folder of meshes, or of positions.npy and faces.npy
+    sequence: PathBuf,
+    /// Package to write
+    #[arg(long, short, value_name = "FILE")]
+    output: PathBuf,
+    /// Train on every Nth shape, the first included; the others are left for `sinew evaluate`
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    train_every: u32,
+    /// Train on the shapes whose numbers, from 0, this text file lists
+    #[arg(long, value_name = "FILE", conflicts_with = "train_every")]
+    train_list: Option<PathBuf>,
+    /// Components of each level, coarse to fine: 10,5 makes 10 coarse ones with 5 fine ones under each [default: 10,5]
+    #[arg(long, value_name = "K[,K...]", value_delimiter = ',')]
+    components: Option<Vec<usize>>,
+    /// Seed of every random choice [default: 0]
+    #[arg(long, value_name = "NUMBER")]
+    seed: Option<u64>,
+    /// Stop training after this time, for example 90s, 5m or 1h30m; such a run cannot be repeated to the byte
+    #[arg(long, value_name = "TIME", value_parser = parse_duration)]
+    time_budget: Option<Duration>,
+    /// TOML file with settings; `sinew inspect --config` shows those of a package
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Go on with a run that was stopped
+    #[arg(long)]
+    resume: bool,
+    /// Throw away a run that was stopped and start anew
+    #[arg(long, conflicts_with = "resume")]
+    restart: bool,
+}
+
+/// Runs `sinew train`.
+pub fn run(arguments: &TrainArguments, console: &Console) -> Result<(), Failure> {
+    let mut config = match &arguments.config {
+        None => TrainConfig::default(),
+        Some(path) => {
+            let text = std::fs::read_to_string(path)
+                .into_diagnostic()
+                .wrap_err_with(|| format!("cannot read {}", path.display()))?;
+            TrainConfig::from_toml(&text)
+                .into_diagnostic()
+                .wrap_err_with(|| format!("{} is not a usable configuration", path.display()))?
+        }
+    };
+    if let Some(components) = &arguments.components {
+        config.components.clone_from(components);
+    }
+    if let Some(seed) = arguments.seed {
+        config.seed = seed;
+    }
+    config.check().into_diagnostic()?;
+    check_output(&arguments.output)?;
+
+    let sequence = load_sequence(&arguments.sequence, console)?;
+    let train_shapes = chosen_shapes(
+        arguments.train_every as usize,
+        arguments.train_list.as_deref(),
+        sequence.shape_count(),
+    )?;
+    console.say(&format!(
+        "{}: {} shapes of {} vertices and {} faces; training on {}",
+        sequence.name,
+        sequence.shape_count(),
+        sequence.vertex_count(),
+        sequence.faces.len(),
+        train_shapes.len()
+    ));
+    let mut work_folder = arguments.output.clone().into_os_string();
+    work_folder.push(".training");
+    let work_folder = PathBuf::from(work_folder);
+    if arguments.restart && work_folder.exists() {
+        std::fs::remove_dir_all(&work_folder)
+            .into_diagnostic()
+            .wrap_err_with(|| format!("cannot remove {}", work_folder.display()))?;
+    }
+    if work_folder.exists() && !arguments.resume {
+        return Err(miette!(
+            help = "add --resume to go on with it, or --restart to throw it away",
+            "{} holds a run that was stopped",
+            work_folder.display()
+        )
+        .into());
+    }
+    console.catch_interrupts();
+    let options = RunOptions {
+        time_budget: arguments.time_budget,
+        work_folder: Some(work_folder.clone()),
+    };
+    let learned = match learn(&sequence, &train_shapes, &config, &options, console) {
+        Ok(learned) => learned,
+        Err(LearnError::Stopped) => {
+            console.finish();
+            return Err(Failure::Stopped(format!(
+                "stopped; the run is kept in {}. The same command with --resume goes on.",
+                work_folder.display()
+            )));
+        }
+        Err(error) => {
+            return Err(miette::Report::msg(error.to_string())
+                .wrap_err("cannot train on this sequence")
+                .into());
+        }
+    };
+    console.finish();
+    save_package(&arguments.output, &learned.package)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot write {}", arguments.output.display()))?;
+    // The package is safe; a left-over folder would only ask a needless question next time.
+    let _ = std::fs::remove_dir_all(&work_folder);
+    console.say(&format!(
+        "{}: {} components, {:.2} MB, {} steps ({})",
+        arguments.output.display(),
+        learned.component_count,
+        learned.package.len() as f64 / 1e6,
+        learned.steps_run,
+        learned.stop_reason
+    ));
+    console.say(&format!(
+        "next: sinew inspect {0}   or   sinew evaluate {0} {1}",
+        arguments.output.display(),
+        arguments.sequence.display()
+    ));
+    Ok(())
+}

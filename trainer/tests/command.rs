@@ -1,0 +1,198 @@
+//! The `sinew` command as its user meets it: what it writes, what it refuses, with which words and which exit code.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn sinew(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sinew"))
+        .args(arguments)
+        .output()
+        .expect("the command starts")
+}
+
+/// Runs and expects success; gives standard output.
+fn run(arguments: &[&str]) -> String {
+    let output = sinew(arguments);
+    assert!(
+        output.status.success(),
+        "{arguments:?}: {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// Runs and expects exit code 2 and all of `words` in the message.
+fn refused(arguments: &[&str], words: &[&str]) {
+    let output = sinew(arguments);
+    let message = String::from_utf8_lossy(&output.stderr);
+    // Long messages are wrapped for the terminal.
+    let message = message
+        .split_whitespace()
+        .filter(|word| *word != "│")
+        .collect::<Vec<_>>()
+        .join(" ");
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+    for word in words {
+        assert!(message.contains(word), "{arguments:?}: `{word}` is not in: {message}");
+    }
+}
+
+fn path(folder: &Path, name: &str) -> String {
+    folder.join(name).to_string_lossy().into_owned()
+}
+
+const SMALL: &str = "components = [3, 2]\n[mixes]\nper_step = 4\n[start]\nsamples = 48\nrounds = 2\ncentres = 16\nposition_modes = 4\n\
+[fit]\nsteps = 6\nvalidate_every = 3\n[validation]\nmix_candidates = []\nstart_seeds = 1\n";
+
+#[test]
+fn the_chain_from_shapes_to_a_pose() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let at = |name: &str| path(folder.path(), name);
+    run(&[
+        "synthesize",
+        "bar",
+        "-o",
+        &at("bar"),
+        "--frames",
+        "12",
+        "--vertices",
+        "150",
+        "--layout",
+        "obj",
+        "-q",
+    ]);
+    std::fs::write(at("small.toml"), SMALL).expect("a file in the temporary folder");
+    let (config, model) = (at("small.toml"), at("bar.sinew"));
+    run(&[
+        "train",
+        &at("bar"),
+        "-o",
+        &model,
+        "--train-every",
+        "3",
+        "--config",
+        &config,
+        "-q",
+    ]);
+    assert!(
+        !Path::new(&at("bar.sinew.training")).exists(),
+        "a finished run leaves nothing behind"
+    );
+
+    let json: serde_json::Value = serde_json::from_str(&run(&["inspect", &model, "--json"])).expect("JSON");
+    let components = json["components"].as_array().expect("a list");
+    assert!(!components.is_empty());
+    let names: Vec<&str> = components.iter().filter_map(|c| c["name"].as_str()).collect();
+    assert!(names.contains(&"c0"), "{names:?}");
+    let kept = run(&["inspect", &model, "--config"]);
+    assert!(kept.contains("per_step = 4"), "{kept}");
+
+    let saved = at("saved");
+    let json = run(&["evaluate", &model, &at("bar"), "--json", "--save", &saved]);
+    let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    assert_eq!(json["shapes"], 8);
+    for key in ["encoder", "feature_projection", "position_projection", "round_trip"] {
+        for figure in ["e_rms", "sted", "sted_s", "sted_t"] {
+            assert!(
+                json[key][figure].as_f64().is_some_and(|x| x.is_finite() && x >= 0.0),
+                "{key}.{figure}: {json}"
+            );
+        }
+    }
+    assert!(json["max_percentage_error"]["two_level"].is_number() && json["components"]["coarse"].is_number());
+    for name in ["truth", "faces", "encoder", "feature_projection", "position_projection"] {
+        assert!(
+            folder.path().join("saved").join(format!("{name}.npy")).exists(),
+            "{name}"
+        );
+    }
+
+    // A pose from the compact and from the baked package is the same pose.
+    let baked = at("bar.baked.sinew");
+    run(&["bake", &model, "-o", &baked, "-q"]);
+    run(&["frame", &model, "--set", "c0=0.1", "-o", &at("a.obj"), "-q"]);
+    run(&["frame", &baked, "--set", "c0=0.1", "-o", &at("b.obj"), "-q"]);
+    let read = |name: &str| std::fs::read(at(name)).expect("the pose was written");
+    assert_eq!(read("a.obj"), read("b.obj"));
+    run(&["frame", &model, "-o", &at("rest.ply"), "-q"]);
+    // Far beyond its stop: clamped, and said.
+    let output = sinew(&["frame", &model, "--set", "c0=1000", "-o", &at("far.npy")]);
+    assert!(output.status.success() && String::from_utf8_lossy(&output.stderr).contains("clamped"));
+
+    refused(&["frame", &model, "--set", "c0=nan", "-o", &at("nan.obj")], &["finite"]);
+    refused(
+        &["frame", &model, "--set", "nose=1", "-o", &at("nose.obj")],
+        &["nose", "c0"],
+    );
+    refused(&["frame", &model, "-o", &at("pose.stl")], &[".obj"]);
+    refused(&["frame", &model, "-o", &at("missing/pose.obj")], &["missing"]);
+    refused(&["bake", &baked, "-o", &at("again.sinew")], &["baked already"]);
+    refused(&["evaluate", &baked, &at("bar")], &["compact"]);
+    for name in ["nan.obj", "nose.obj", "pose.stl", "again.sinew"] {
+        assert!(!folder.path().join(name).exists(), "{name} was written all the same");
+    }
+    let mut bytes = read("bar.sinew");
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 4;
+    std::fs::write(at("flipped.sinew"), &bytes).expect("a file in the temporary folder");
+    refused(&["inspect", &at("flipped.sinew")], &["flipped.sinew"]);
+    std::fs::write(at("cut.sinew"), &bytes[..middle]).expect("a file in the temporary folder");
+    refused(&["inspect", &at("cut.sinew")], &["cut.sinew"]);
+}
+
+#[test]
+fn input_that_cannot_be_used_is_named() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let at = |name: &str| path(folder.path(), name);
+    let out = at("model.sinew");
+    let write = |name: &str, text: &str| {
+        let file = folder.path().join(name);
+        std::fs::create_dir_all(file.parent().expect("a folder")).expect("a folder in the temporary folder");
+        std::fs::write(file, text).expect("a file in the temporary folder");
+    };
+    const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    std::fs::create_dir(at("empty")).expect("a folder");
+    refused(&["train", &at("empty"), "-o", &out], &["empty"]);
+    refused(&["train", &at("nowhere"), "-o", &out], &["nowhere"]);
+    write("one/a.obj", CUBE);
+    refused(&["train", &at("one"), "-o", &out], &["one"]);
+    write("nan/a.obj", CUBE);
+    write("nan/b.obj", &CUBE.replace("v 1 0 0", "v nan 0 0"));
+    refused(&["train", &at("nan"), "-o", &out], &["b.obj", "2"]);
+    write("faces/a.obj", CUBE);
+    write("faces/b.obj", &CUBE.replace("f 2 3 4", "f 2 4 3"));
+    refused(&["train", &at("faces"), "-o", &out], &["b.obj"]);
+    write(
+        "flat/a.obj",
+        &CUBE
+            .replace("v 1 0 0", "v 0 0 0")
+            .replace("v 0 1 0", "v 0 0 0")
+            .replace("v 0 0 1", "v 0 0 0"),
+    );
+    write("flat/b.obj", CUBE);
+    refused(&["train", &at("flat"), "-o", &out], &["a.obj"]);
+    write("good/a.obj", CUBE);
+    write("good/b.obj", &CUBE.replace("v 1 0 0", "v 1.2 0 0"));
+    refused(
+        &["train", &at("good"), "-o", &at("no/such/folder/model.sinew")],
+        &["folder"],
+    );
+    refused(
+        &["train", &at("good"), "-o", &out, "--components", "0"],
+        &["components"],
+    );
+    refused(&["train", &at("good"), "-o", &out, "--time-budget", "soon"], &["soon"]);
+    write("bad.toml", "seed = 1\n[fit]\nspeed = 3\n");
+    refused(
+        &["train", &at("good"), "-o", &out, "--config", &at("bad.toml")],
+        &["bad.toml", "speed"],
+    );
+    write("list.txt", "0\n1 # both\n7\n");
+    refused(
+        &["train", &at("good"), "-o", &out, "--train-list", &at("list.txt")],
+        &["list.txt:3", "7"],
+    );
+    refused(&["synthesize", "flag", "-o", &at("good")], &["not empty"]);
+    refused(&["synthesize", "flag", "-o", &at("tiny"), "--vertices", "3"], &["3"]);
+    assert!(!Path::new(&out).exists());
+}
