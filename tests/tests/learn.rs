@@ -1,0 +1,159 @@
+//! The whole chain from shapes to package: the same bytes whatever the thread count and however often it was stopped, and
+//! a package that plays what it was taught.
+
+use core::sync::atomic::{AtomicU64, Ordering};
+
+use sinew_formats::interchange::MeshSequence;
+use sinew_formats::package::CompactView;
+use sinew_trainer::config::TrainConfig;
+use sinew_trainer::evaluate::{EvaluationInput, evaluate};
+use sinew_trainer::learn::{LearnError, Learned, Reporter, RunOptions, Silent, learn};
+use sinew_trainer::synthesize::{Settings, Subject};
+
+fn bar() -> MeshSequence {
+    let settings = Settings {
+        frames: 14,
+        vertices: 200,
+        seed: 1,
+    };
+    Subject::Bar.synthesize(&settings).expect("the settings are in range")
+}
+
+/// A training of a second or two.
+fn small() -> TrainConfig {
+    TrainConfig::from_toml(
+        "components = [3, 2]\n\
+         [mixes]\nper_step = 4\n\
+         [start]\nsamples = 48\nrounds = 3\ncentres = 24\nposition_modes = 6\n\
+         [fit]\nsteps = 12\nvalidate_every = 3\ncheckpoint_every = 4\n\
+         [validation]\nshapes_min = 4\nmix_candidates = [[0.2, 2, 4], [0.4, 2, 3]]\nstart_seeds = 1\n",
+    )
+    .expect("a valid configuration")
+}
+
+const TRAIN: [usize; 7] = [0, 2, 4, 6, 8, 10, 12];
+
+fn learn_on(threads: usize, options: &RunOptions) -> Learned {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .expect("a thread pool");
+    pool.install(|| learn(&bar(), &TRAIN, &small(), options, &Silent))
+        .expect("the bar can be learned")
+}
+
+#[test]
+fn same_bytes_on_one_and_two_threads() {
+    let one = learn_on(1, &RunOptions::default());
+    let two = learn_on(2, &RunOptions::default());
+    assert!(one.package[..] == two.package[..]);
+}
+
+/// Asks to stop when the given number of training steps have been reported.
+struct StopAfter {
+    training: AtomicU64,
+    left: AtomicU64,
+}
+
+impl Reporter for StopAfter {
+    fn stage(&self, name: &str, _: u64) {
+        self.training
+            .store(u64::from(name.starts_with("training")), Ordering::SeqCst);
+    }
+
+    fn advance(&self, _: u64, _: &str) {
+        if self.training.load(Ordering::SeqCst) == 1 {
+            let left = self.left.load(Ordering::SeqCst);
+            self.left.store(left.saturating_sub(1), Ordering::SeqCst);
+        }
+    }
+
+    fn notice(&self, _: &str) {}
+
+    fn stop_requested(&self) -> bool {
+        self.training.load(Ordering::SeqCst) == 1 && self.left.load(Ordering::SeqCst) == 0
+    }
+}
+
+#[test]
+fn a_run_that_was_stopped_again_and_again_ends_with_the_same_bytes() {
+    let whole = learn_on(2, &RunOptions::default());
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let options = RunOptions {
+        time_budget: None,
+        work_folder: Some(folder.path().join("run")),
+    };
+    let mut stops = 0;
+    let resumed = loop {
+        let reporter = StopAfter {
+            training: AtomicU64::new(0),
+            left: AtomicU64::new(5),
+        };
+        match learn(&bar(), &TRAIN, &small(), &options, &reporter) {
+            Ok(learned) => break learned,
+            Err(LearnError::Stopped) => stops += 1,
+            Err(error) => panic!("{error}"),
+        }
+        assert!(stops < 20, "no end in sight");
+    };
+    assert!(stops >= 2, "stopped {stops} times");
+    assert!(whole.package[..] == resumed.package[..]);
+}
+
+#[test]
+fn a_run_on_other_shapes_is_not_resumed() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let options = RunOptions {
+        time_budget: None,
+        work_folder: Some(folder.path().join("run")),
+    };
+    let reporter = StopAfter {
+        training: AtomicU64::new(0),
+        left: AtomicU64::new(2),
+    };
+    assert!(matches!(
+        learn(&bar(), &TRAIN, &small(), &options, &reporter),
+        Err(LearnError::Stopped)
+    ));
+    let other = learn(&bar(), &[0, 1, 3, 5], &small(), &options, &Silent);
+    assert!(matches!(other, Err(LearnError::RunFolder(_))), "{other:?}");
+}
+
+/// Position error that this small training must stay below on shapes it has not seen, per mille of the bounding ball; the
+/// bar's own motion is above 100.
+const UNSEEN_E_RMS: f64 = 25.0;
+
+#[test]
+fn unseen_shapes_are_played_from_few_components() {
+    let learned = learn_on(2, &RunOptions::default());
+    let view = CompactView::open(&learned.package).expect("a package that opens");
+    assert_eq!(view.component_count(), learned.component_count);
+    let sequence = bar();
+    let input = EvaluationInput {
+        package: &learned.package,
+        sequence: &sequence,
+        test_shapes: &[1, 3, 5, 7, 9, 11, 13],
+        settings: learned.config.features,
+    };
+    let (evaluation, _) = evaluate(&input, &|_| {}).expect("the package can be measured");
+    assert!(evaluation.position_projection.e_rms < UNSEEN_E_RMS, "{evaluation:?}");
+    assert!(
+        evaluation.position_projection.e_rms <= evaluation.encoder.e_rms,
+        "{evaluation:?}"
+    );
+    assert!(
+        evaluation.round_trip.e_rms < evaluation.position_projection.e_rms,
+        "{evaluation:?}"
+    );
+}
+
+#[test]
+fn what_cannot_be_learned_is_refused_with_a_reason() {
+    let mut still = bar();
+    let rest = still.shapes[0].clone();
+    still.shapes.iter_mut().for_each(|shape| shape.clone_from(&rest));
+    let refused = learn(&still, &TRAIN, &small(), &RunOptions::default(), &Silent);
+    assert!(matches!(refused, Err(LearnError::NothingMoves { .. })), "{refused:?}");
+    let refused = learn(&bar(), &[0], &small(), &RunOptions::default(), &Silent);
+    assert!(matches!(refused, Err(LearnError::TooFewShapes { .. })), "{refused:?}");
+}
