@@ -31,6 +31,7 @@ mod controls;
 mod decode;
 mod error;
 mod frame;
+pub mod input;
 mod linearize;
 mod normals;
 mod reconstruct;

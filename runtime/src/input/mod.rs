@@ -1,0 +1,7 @@
+//! Input: from the bytes of a knob box to the weights of the components, without a heap and without ever blocking.
+//!
+//! Path of data: bytes in any chunking -> protocol -> [`KnobEvent`] -> calibration, filter, takeover, map -> [`crate::Controls`].
+
+mod event;
+
+pub use event::{KnobEvent, Reading};
