@@ -6,15 +6,16 @@
 //!
 //! Index letters everywhere: `v` vertex, `f` face, `k` component, `l` level, `m` shape, `c` coordinate.
 
-pub mod bake;
 pub mod baselines;
 pub mod components;
 pub mod config;
 pub mod evaluate;
 pub mod features;
 pub mod learn;
-pub mod mesh;
 pub mod network;
 pub mod report;
-pub mod synthesize;
 pub mod training;
+
+pub use sinew_bake as bake;
+pub use sinew_bake::mesh;
+pub use sinew_synthesize as synthesize;

@@ -26,4 +26,6 @@ pub use scores::{ScoreError, Scores, score};
 pub use sted::{Sted, sted};
 
 #[cfg(test)]
+mod fold_tests;
+#[cfg(test)]
 mod tests;

@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::polar::Polar;
+pub use crate::mesh::widened;
 
 /// `p -> rotation p + translation`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,11 +66,6 @@ pub fn align_shapes(reference: &[[f64; 3]], shapes: &[Vec<[f32; 3]>]) -> Vec<Ali
             }
         })
         .collect()
-}
-
-/// Positions as f64.
-pub fn widened(shape: &[[f32; 3]]) -> Vec<[f64; 3]> {
-    shape.iter().map(|p| p.map(f64::from)).collect()
 }
 
 fn centroid(shape: &[[f64; 3]]) -> Vector3<f64> {

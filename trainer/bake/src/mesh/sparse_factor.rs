@@ -70,7 +70,7 @@ impl SparseFactor {
     }
 
     /// Factor of the matrix whose lower triangle is the sum of `lower`, in a fixed order.
-    pub(crate) fn from_lower(vertex_count: usize, lower: &[Triplet<usize, usize, f64>]) -> Result<Self, FactorError> {
+    pub fn from_lower(vertex_count: usize, lower: &[Triplet<usize, usize, f64>]) -> Result<Self, FactorError> {
         let too_large = FactorError::TooLarge { vertex_count };
         let matrix = SparseColMat::try_new_from_triplets(vertex_count, vertex_count, lower).map_err(|_| too_large)?;
         let parameters = CholeskySymbolicParams {

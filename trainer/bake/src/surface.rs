@@ -4,10 +4,7 @@
 use sinew_formats::package::CompactView;
 
 use super::factor::AnchoredLaplacian;
-use crate::{
-    features::align::widened,
-    mesh::{cotangent::EdgeWeights, topology::Topology},
-};
+use crate::mesh::{cotangent::EdgeWeights, topology::Topology, widened};
 
 /// Connectivity and weights of a package's rest shape, source order. V vertices.
 #[derive(Debug, Clone)]

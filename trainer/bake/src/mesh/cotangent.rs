@@ -36,7 +36,7 @@ impl EdgeWeights {
 
 /// `1/2 (cot a_ij + cot b_ij)` for every ring entry, each cotangent held within `bound`; `None` where no face with area
 /// has the edge.
-pub(crate) fn half_cotangents(topology: &Topology, rest: &[[f64; 3]], bound: f64) -> Vec<Option<f64>> {
+pub fn half_cotangents(topology: &Topology, rest: &[[f64; 3]], bound: f64) -> Vec<Option<f64>> {
     let mut halves: Vec<Option<f64>> = vec![None; topology.ring.len()];
     for face in topology
         .faces
@@ -59,7 +59,7 @@ pub(crate) fn half_cotangents(topology: &Topology, rest: &[[f64; 3]], bound: f64
 }
 
 /// Mean of the positive ones; 1 where there are none.
-pub(crate) fn positive_mean(halves: &[Option<f64>]) -> f64 {
+pub fn positive_mean(halves: &[Option<f64>]) -> f64 {
     let (sum, count) = halves
         .iter()
         .flatten()

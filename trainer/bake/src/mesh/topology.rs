@@ -6,7 +6,7 @@
 use super::bridge::bridge_edges;
 
 /// A face counts as flat when twice its area is below this share of its longest edge squared: rounding, not shape.
-pub(crate) const FLAT_FACE: f64 = 1e-12;
+pub const FLAT_FACE: f64 = 1e-12;
 
 /// No vertex weighs less than this share of the mean area, so that loose vertices still count in a fit.
 const AREA_FLOOR: f64 = 0.01;
@@ -163,17 +163,17 @@ impl Topology {
 }
 
 /// `b - a`.
-pub(crate) fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+pub fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [b[0] - a[0], b[1] - a[1], b[2] - a[2]]
 }
 
 /// Scalar product.
-pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Vector product.
-pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -182,22 +182,22 @@ pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 /// Euclidean length.
-pub(crate) fn length(a: [f64; 3]) -> f64 {
+pub fn length(a: [f64; 3]) -> f64 {
     dot(a, a).sqrt()
 }
 
 /// Corners of a face.
-pub(crate) fn corners(face: &[u32; 3], positions: &[[f64; 3]]) -> [[f64; 3]; 3] {
+pub fn corners(face: &[u32; 3], positions: &[[f64; 3]]) -> [[f64; 3]; 3] {
     face.map(|v| positions[v as usize])
 }
 
 /// Whether a face names a vertex twice: it has no edges worth the name.
-pub(crate) fn names_a_vertex_twice(&[a, b, c]: &[u32; 3]) -> bool {
+pub fn names_a_vertex_twice(&[a, b, c]: &[u32; 3]) -> bool {
     a == b || b == c || c == a
 }
 
 /// Whether a face has no area but rounding's.
-pub(crate) fn is_flat(face: &[u32; 3], positions: &[[f64; 3]]) -> bool {
+pub fn is_flat(face: &[u32; 3], positions: &[[f64; 3]]) -> bool {
     let [a, b, c] = corners(face, positions);
     let longest = [difference(a, b), difference(b, c), difference(c, a)]
         .iter()

@@ -1,10 +1,10 @@
 //! Small meshes for the tests of this crate.
 
 /// Positions and faces.
-pub(crate) type Mesh = (Vec<[f64; 3]>, Vec<[u32; 3]>);
+pub type Mesh = (Vec<[f64; 3]>, Vec<[u32; 3]>);
 
 /// A flat grid of `columns` x `rows` squares of side `side`, in the plane z = 0.
-pub(crate) fn grid(columns: u32, rows: u32, side: f64) -> Mesh {
+pub fn grid(columns: u32, rows: u32, side: f64) -> Mesh {
     let across = columns + 1;
     let positions = (0..across * (rows + 1))
         .map(|v| [f64::from(v % across) * side, f64::from(v / across) * side, 0.0])
@@ -25,7 +25,7 @@ pub(crate) fn grid(columns: u32, rows: u32, side: f64) -> Mesh {
 }
 
 /// A tube of radius 1 about the z axis, open at both ends: `around` vertices a ring, `rings` rings, `height` tall.
-pub(crate) fn tube(around: u32, rings: u32, height: f64) -> Mesh {
+pub fn tube(around: u32, rings: u32, height: f64) -> Mesh {
     let positions = (0..around * rings)
         .map(|v| {
             let (ring, place) = (v / around, v % around);
@@ -53,7 +53,7 @@ pub(crate) fn tube(around: u32, rings: u32, height: f64) -> Mesh {
 }
 
 /// The unit sphere: an octahedron whose faces are split in four `splits` times. 6, 18, 66, 258, 1,026 ... vertices.
-pub(crate) fn sphere(splits: u32) -> Mesh {
+pub fn sphere(splits: u32) -> Mesh {
     let mut positions = vec![
         [1.0, 0.0, 0.0],
         [-1.0, 0.0, 0.0],
@@ -98,7 +98,7 @@ pub(crate) fn sphere(splits: u32) -> Mesh {
 }
 
 /// The same mesh elsewhere.
-pub(crate) fn moved((positions, faces): &Mesh, by: [f64; 3]) -> Mesh {
+pub fn moved((positions, faces): &Mesh, by: [f64; 3]) -> Mesh {
     (
         positions
             .iter()
@@ -109,7 +109,7 @@ pub(crate) fn moved((positions, faces): &Mesh, by: [f64; 3]) -> Mesh {
 }
 
 /// Several meshes as one, in order.
-pub(crate) fn merged(meshes: &[Mesh]) -> Mesh {
+pub fn merged(meshes: &[Mesh]) -> Mesh {
     let mut whole: Mesh = (Vec::new(), Vec::new());
     for (positions, faces) in meshes {
         let first = whole.0.len() as u32;

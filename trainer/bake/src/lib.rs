@@ -6,6 +6,7 @@
 
 pub mod factor;
 pub mod fold;
+pub mod mesh;
 pub mod sparse;
 mod surface;
 
@@ -163,7 +164,7 @@ impl SolverRings {
     }
 }
 
-#[cfg(test)]
-pub(crate) mod fixture;
+#[cfg(any(test, feature = "fixture"))]
+pub mod fixture;
 #[cfg(test)]
 mod tests;
