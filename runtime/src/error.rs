@@ -3,6 +3,8 @@
 
 use core::fmt;
 
+use crate::simd::Kernels;
+
 /// A buffer the caller hands to a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
@@ -164,6 +166,11 @@ pub enum WorkspaceError {
         /// Bytes given.
         actual_bytes: usize,
     },
+    /// This processor lacks the instructions.
+    KernelsMissing {
+        /// The kernels asked for.
+        kernels: Kernels,
+    },
 }
 
 impl core::error::Error for WorkspaceError {}
@@ -178,6 +185,12 @@ impl fmt::Display for WorkspaceError {
                 write!(
                     out,
                     "the workspace needs {required_bytes} bytes here and got {actual_bytes}"
+                )
+            }
+            Self::KernelsMissing { kernels } => {
+                write!(
+                    out,
+                    "this processor does not run the {kernels:?} kernels; use Workspace::new"
                 )
             }
         }

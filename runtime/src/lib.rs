@@ -20,7 +20,8 @@
 //! # }
 //! ```
 #![no_std]
-#![forbid(unsafe_code)]
+// Only the kernels of one instruction set may allow it, each in a file of its own.
+#![deny(unsafe_code)]
 
 #[cfg(test)]
 extern crate std;
@@ -49,6 +50,7 @@ pub use frame::{Frame, FrameOutcome};
 pub use linearize::Tangent;
 pub use normals::Normals;
 pub use reconstruct::Reconstruct;
+pub use simd::Kernels;
 pub use simd::scalar::surface::FALLBACK_NORMAL;
 pub use sinew_formats::package::{FEATURE_COUNT, OpenError};
 pub use workspace::{Workspace, WorkspaceLayout};

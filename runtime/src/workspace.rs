@@ -6,6 +6,7 @@ use sinew_formats::package::FEATURE_COUNT;
 
 use crate::basis::Basis;
 use crate::error::{FrameError, WorkspaceError};
+use crate::simd::Kernels;
 
 /// Start of every buffer: a cache line, and the widest vector register.
 const ALIGNMENT: usize = 64;
@@ -70,6 +71,8 @@ fn section_bytes<T>(count: usize) -> usize {
 #[derive(Debug)]
 pub struct Workspace<'w> {
     basis_id: [u8; 16],
+    /// What the frame path runs on; present on this machine.
+    pub(crate) kernels: Kernels,
     /// Weights of the pose, tiny ones flushed. Shape: `[K]`.
     pub(crate) weights: &'w mut [f32],
     /// Features of the pose, network units. Shape: `[V]`, solver order.
@@ -85,11 +88,23 @@ pub struct Workspace<'w> {
 }
 
 impl<'w> Workspace<'w> {
-    /// Carves `memory`, sets the rest pose. Bytes beyond the layout's stay untouched.
+    /// Carves `memory`, sets the rest pose. Bytes beyond the layout's stay untouched. Frames run on the widest kernels of
+    /// this machine.
     ///
     /// # Errors
     /// [`WorkspaceError::TooSmall`], with the size that this memory would need given where it starts.
     pub fn new(basis: &Basis<'_>, memory: &'w mut [u8]) -> Result<Self, WorkspaceError> {
+        Self::with_kernels(basis, memory, Kernels::detect())
+    }
+
+    /// The same with kernels of one's own choice: [`Kernels::Scalar`] gives the same bits on every machine.
+    ///
+    /// # Errors
+    /// Those of [`Workspace::new`]; [`WorkspaceError::KernelsMissing`] where the processor lacks the instructions.
+    pub fn with_kernels(basis: &Basis<'_>, memory: &'w mut [u8], kernels: Kernels) -> Result<Self, WorkspaceError> {
+        if !kernels.run_here() {
+            return Err(WorkspaceError::KernelsMissing { kernels });
+        }
         let sections = Sections::of(basis);
         let skipped = memory.as_ptr().align_offset(ALIGNMENT);
         let required_bytes = skipped.saturating_add(sections.size_bytes());
@@ -110,6 +125,7 @@ impl<'w> Workspace<'w> {
         let basis_id = basis.id();
         Ok(Self {
             basis_id,
+            kernels,
             weights,
             features,
             displacement,
@@ -127,6 +143,11 @@ impl<'w> Workspace<'w> {
     /// Weights of the pose; those under 1e-6 count as zero. Shape: `[K]`.
     pub fn weights(&self) -> &[f32] {
         self.weights
+    }
+
+    /// What frames on this workspace run on.
+    pub fn kernels(&self) -> Kernels {
+        self.kernels
     }
 
     /// Back to rest, which is exact.
@@ -197,6 +218,23 @@ mod tests {
                 actual_bytes: exact - 1
             }
         );
+    }
+
+    #[test]
+    fn kernels_are_chosen_once_and_refused_where_they_do_not_run() {
+        let package = Package::small(1);
+        let basis = open(&package);
+        let mut memory = vec![0_u8; WorkspaceLayout::for_basis(&basis).unaligned_bytes()];
+        assert_eq!(
+            Workspace::new(&basis, &mut memory).unwrap().kernels(),
+            Kernels::detect()
+        );
+        for kernels in [Kernels::Scalar, Kernels::Avx2, Kernels::Avx512] {
+            let made = Workspace::with_kernels(&basis, &mut memory, kernels).map(|workspace| workspace.kernels());
+            let missing = Err(WorkspaceError::KernelsMissing { kernels });
+            assert_eq!(made, if kernels.run_here() { Ok(kernels) } else { missing });
+        }
+        assert!(Kernels::Scalar.run_here());
     }
 
     #[test]

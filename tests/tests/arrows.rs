@@ -23,10 +23,11 @@ const ARROWS: [(&str, &[&str]); 6] = [
 const DEVELOPMENT_ARROWS: [(&str, &[&str]); 1] = [("sinew-runtime", &["sinew-bake", "sinew-synthesize"])];
 
 /// Everything that the runtime links, all of it without std.
-const RUNTIME_CLOSURE: [&str; 17] = [
+const RUNTIME_CLOSURE: [&str; 18] = [
     "bytecheck",
     "bytemuck",
     "cfg-if",
+    "cpufeatures",
     "crc",
     "crc-catalog",
     "half",

@@ -1,5 +1,62 @@
 //! The kernels: free functions over plain slices, without a basis, a workspace or a check of lengths.
 //!
-//! [`scalar`] is the reference; whatever else stands here one day must equal it within a named tolerance.
+//! [`scalar`] is the reference; every other kernel equals it within a named tolerance. Which ones run is decided once, when
+//! a workspace is made: by what the processor says on x86-64, at compile time elsewhere.
 
 pub(crate) mod scalar;
+
+/// A set of kernels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[non_exhaustive]
+pub enum Kernels {
+    /// The reference: plain Rust, the same bits on every machine.
+    Scalar,
+    /// Eight lanes with fused multiply-add: x86-64 with AVX2, FMA and F16C.
+    Avx2,
+    /// Sixteen lanes: x86-64 with AVX-512 F, BW, DQ and VL besides.
+    Avx512,
+}
+
+#[cfg(target_arch = "x86_64")]
+cpufeatures::new!(avx2_present, "avx2", "fma");
+#[cfg(target_arch = "x86_64")]
+cpufeatures::new!(
+    avx512_present,
+    "avx2",
+    "fma",
+    "avx512f",
+    "avx512bw",
+    "avx512dq",
+    "avx512vl"
+);
+
+/// Conversion of halves, which `cpufeatures` does not know. Asked after AVX, so the registers are there.
+#[cfg(target_arch = "x86_64")]
+fn f16c_present() -> bool {
+    /// Of ECX in leaf 1.
+    const F16C: u32 = 1 << 29;
+    core::arch::x86_64::__cpuid(1).ecx & F16C != 0
+}
+
+impl Kernels {
+    /// The widest that run here.
+    pub fn detect() -> Self {
+        [Self::Avx512, Self::Avx2]
+            .into_iter()
+            .find(|kernels| kernels.run_here())
+            .unwrap_or(Self::Scalar)
+    }
+
+    /// Whether this machine has the instructions.
+    pub fn run_here(self) -> bool {
+        match self {
+            Self::Scalar => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => avx2_present::get() && f16c_present(),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => avx512_present::get() && f16c_present(),
+            #[cfg(not(target_arch = "x86_64"))]
+            Self::Avx2 | Self::Avx512 => false,
+        }
+    }
+}
