@@ -34,8 +34,57 @@ pub struct BakedBasis<'a> {
     pub components: &'a [BakedComponent<'a>],
     /// The tier whose nodes are the vertices: N = V.
     pub exact: BakedTier<'a>,
-    /// A tier of fewer nodes.
-    pub fast: Option<BakedTier<'a>>,
+    /// A tier of fewer nodes, for crowds and small devices.
+    pub fast: Option<BakedFast<'a>>,
+}
+
+/// The fast tier: a graph of N nodes stands for the mesh, and each vertex follows four of them. A vertex at rest position r
+/// moves by `sum over its four nodes n of w_n (d_n + D_n (r - r_n))`, where d_n is the node's displacement, `D_n = T_n - I`
+/// its deformation gradient less identity and r_n its rest position.
+#[derive(Archive, Serialize, Debug, Clone, Copy)]
+pub struct BakedFast<'a> {
+    /// The nodes; ring weights may be negative here.
+    pub nodes: BakedTier<'a>,
+    /// Middle of the rest shape: gradients act about it, so that a mesh far from the origin loses no digits.
+    pub centre: [f32; 3],
+    /// Rest shape in **source** order, to the bit that of the exact tier. Shape: `[V]`.
+    #[rkyv(with = InlineAsBox)]
+    pub rest_positions: &'a [[f32; 3]],
+    /// The four nodes of each vertex, solver indices of the tier. Shape: `[V]`, source order.
+    #[rkyv(with = InlineAsBox)]
+    pub skin_nodes: &'a [[u16; SKIN_NODES]],
+    /// Their weights, in units of 1 / 65535; each row sums to 65535. Shape: `[V]`, source order.
+    #[rkyv(with = InlineAsBox)]
+    pub skin_weights: &'a [[u16; SKIN_NODES]],
+    /// How far the tier is from the exact one.
+    pub error: FastError,
+}
+
+/// Nodes that a vertex of the fast tier follows.
+pub const SKIN_NODES: usize = 4;
+
+/// What stands for 1 in [`BakedFast::skin_weights`].
+pub const SKIN_WEIGHT_SUM: u32 = u16::MAX as u32;
+
+/// How far the fast tier is from the exact one, measured when the package was baked. Distances are shares of the diagonal
+/// of the rest shape's bounding box. *Mixed* poses draw every control evenly between its stops; *single* ones put one
+/// control at one of its stops and leave the rest at zero.
+#[derive(Archive, Serialize, Debug, Clone, Copy, PartialEq)]
+pub struct FastError {
+    /// Root mean square distance, over all vertices of the mixed poses.
+    pub mixed_rms: f32,
+    /// 99 of 100 vertices of the mixed poses are nearer than this.
+    pub mixed_p99: f32,
+    /// Greatest distance in the mixed poses.
+    pub mixed_max: f32,
+    /// Root mean square distance, over all vertices of the single poses.
+    pub single_rms: f32,
+    /// Greatest distance in the single poses.
+    pub single_max: f32,
+    /// Root mean square angle between the normals of both tiers in the mixed poses, radians.
+    pub normal_rms: f32,
+    /// How many mixed poses there were.
+    pub mixed_poses: u32,
 }
 
 /// What a frame reads from blend to solve, for a set of N nodes: all vertices, or a graph that stands for them. Solver
@@ -51,7 +100,7 @@ pub struct BakedTier<'a> {
     /// Solver indices, ascending within a row, never the row itself. Shape: `[2 * edges]`.
     #[rkyv(with = InlineAsBox)]
     pub ring: &'a [u32],
-    /// Half the cotangent sum of each edge, non-negative, symmetric. Shape: that of `ring`.
+    /// Half the cotangent sum of each edge, symmetric, non-negative in the exact tier. Shape: that of `ring`.
     #[rkyv(with = InlineAsBox)]
     pub ring_weights: &'a [f32],
     /// Columns of the unit lower factor of `L + anchor = F D F^T`, below the diagonal. Shape: `[N + 1]`.

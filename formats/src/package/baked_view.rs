@@ -3,7 +3,8 @@
 use rkyv::{api::low::access, rancor::Failure};
 
 use super::{
-    ArchivedBakedBasis, ArchivedBakedTier, BakedBlock, BakedComponent, FEATURE_COUNT, Header, OpenError, PackageKind,
+    ArchivedBakedBasis, ArchivedBakedFast, ArchivedBakedTier, BakedBlock, BakedComponent, FEATURE_COUNT, FastError, Header,
+    OpenError, PackageKind, SKIN_NODES,
     open::{native, payload},
     rules,
 };
@@ -19,6 +20,12 @@ pub struct BakedView<'a> {
 #[derive(Clone, Copy)]
 pub struct TierView<'a> {
     archived: &'a ArchivedBakedTier<'static>,
+}
+
+/// The fast tier of an opened baked package. Fields mean what [`super::BakedFast`] says.
+#[derive(Clone, Copy)]
+pub struct FastView<'a> {
+    archived: &'a ArchivedBakedFast<'static>,
 }
 
 impl<'a> BakedView<'a> {
@@ -132,8 +139,51 @@ impl<'a> BakedView<'a> {
     }
 
     /// The tier of fewer nodes, where the package has one.
-    pub fn fast(&self) -> Option<TierView<'a>> {
-        self.archived.fast.as_ref().map(|archived| TierView { archived })
+    pub fn fast(&self) -> Option<FastView<'a>> {
+        self.archived.fast.as_ref().map(|archived| FastView { archived })
+    }
+}
+
+impl<'a> FastView<'a> {
+    /// The nodes and all that blend, decode and solve read.
+    pub fn nodes(&self) -> TierView<'a> {
+        TierView {
+            archived: &self.archived.nodes,
+        }
+    }
+
+    /// What gradients act about.
+    pub fn centre(&self) -> [f32; 3] {
+        bytemuck::cast(self.archived.centre)
+    }
+
+    /// Source order, finite; those of the exact tier. Shape: `[V]`.
+    pub fn rest_positions(&self) -> &'a [[f32; 3]] {
+        native(&self.archived.rest_positions)
+    }
+
+    /// Solver indices of the tier, each < N. Shape: `[V]`, source order.
+    pub fn skin_nodes(&self) -> &'a [[u16; SKIN_NODES]] {
+        native(&self.archived.skin_nodes)
+    }
+
+    /// Each row sums to [`SKIN_WEIGHT_SUM`](super::SKIN_WEIGHT_SUM). Shape: `[V]`, source order.
+    pub fn skin_weights(&self) -> &'a [[u16; SKIN_NODES]] {
+        native(&self.archived.skin_weights)
+    }
+
+    /// How far the tier is from the exact one.
+    pub fn error(&self) -> FastError {
+        let error = &self.archived.error;
+        FastError {
+            mixed_rms: error.mixed_rms.to_native(),
+            mixed_p99: error.mixed_p99.to_native(),
+            mixed_max: error.mixed_max.to_native(),
+            single_rms: error.single_rms.to_native(),
+            single_max: error.single_max.to_native(),
+            normal_rms: error.normal_rms.to_native(),
+            mixed_poses: error.mixed_poses.to_native(),
+        }
     }
 }
 
@@ -158,7 +208,7 @@ impl<'a> TierView<'a> {
         native(&self.archived.ring)
     }
 
-    /// Shape: that of `ring`; finite, non-negative, symmetric.
+    /// Shape: that of `ring`; finite, symmetric, non-negative in the exact tier.
     pub fn ring_weights(&self) -> &'a [f32] {
         native(&self.archived.ring_weights)
     }

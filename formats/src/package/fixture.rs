@@ -9,8 +9,8 @@ use alloc::vec::Vec;
 use half::f16;
 
 use super::{
-    BakedBasis, BakedBlock, BakedComponent, BakedTier, BlockRecord, CompactBasis, ComponentRecord, FEATURE_COUNT,
-    GraphConvRecord, Header, NONE, PackageKind, Provenance, Quality, write_compact,
+    BakedBasis, BakedBlock, BakedComponent, BakedFast, BakedTier, BlockRecord, CompactBasis, ComponentRecord,
+    FEATURE_COUNT, FastError, GraphConvRecord, Header, NONE, PackageKind, Provenance, Quality, SKIN_NODES, write_compact,
 };
 
 /// V of the grid.
@@ -53,7 +53,19 @@ pub struct TinyBaked {
     pub blocks: Vec<BakedBlock>,
     pub components: Vec<BakedComponent<'static>>,
     pub exact: TinyTier,
-    pub fast: Option<TinyTier>,
+    pub fast: Option<TinyFast>,
+}
+
+/// Owns what a [`BakedFast`] borrows.
+#[derive(Debug, Clone)]
+#[expect(missing_docs, reason = "fields are those of BakedFast")]
+pub struct TinyFast {
+    pub nodes: TinyTier,
+    pub centre: [f32; 3],
+    pub rest_positions: Vec<[f32; 3]>,
+    pub skin_nodes: Vec<[u16; SKIN_NODES]>,
+    pub skin_weights: Vec<[u16; SKIN_NODES]>,
+    pub error: FastError,
 }
 
 /// Owns what a [`BakedTier`] borrows.
@@ -108,7 +120,44 @@ impl TinyBaked {
             blocks: &self.blocks,
             components: &self.components,
             exact: self.exact.tier(),
-            fast: self.fast.as_ref().map(TinyTier::tier),
+            fast: self.fast.as_ref().map(TinyFast::fast),
+        }
+    }
+
+    /// A fast tier that is the exact one over again: every vertex is a node and follows itself, so both play the same.
+    pub fn own_nodes(&self) -> TinyFast {
+        let vertices = self.solver_from_vertex.iter();
+        TinyFast {
+            nodes: self.exact.clone(),
+            centre: [0.25, 0.5, 0.0],
+            rest_positions: vertices
+                .clone()
+                .map(|&solver| self.exact.rest_positions[solver as usize])
+                .collect(),
+            skin_nodes: vertices.map(|&solver| [solver as u16; SKIN_NODES]).collect(),
+            skin_weights: alloc::vec![[16_384, 16_384, 16_384, 16_383]; self.solver_from_vertex.len()],
+            error: FastError {
+                mixed_rms: 1e-6,
+                mixed_p99: 2e-6,
+                mixed_max: 4e-6,
+                single_rms: 0.5e-6,
+                single_max: 3e-6,
+                normal_rms: 1e-5,
+                mixed_poses: 64,
+            },
+        }
+    }
+}
+
+impl TinyFast {
+    fn fast(&self) -> BakedFast<'_> {
+        BakedFast {
+            nodes: self.nodes.tier(),
+            centre: self.centre,
+            rest_positions: &self.rest_positions,
+            skin_nodes: &self.skin_nodes,
+            skin_weights: &self.skin_weights,
+            error: self.error,
         }
     }
 }

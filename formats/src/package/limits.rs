@@ -39,11 +39,13 @@ pub const VALUE_SCALE: f32 = 1e6;
 pub const FEATURE_SCALE: f32 = 1e3;
 /// Entry of a convolution's matrix or bias, either sign.
 pub const NETWORK_VALUE: f32 = 1e6;
-/// Cotangent weight of an edge.
+/// Nodes of a fast tier: a skin names them in 16 bits.
+pub const FAST_NODES: usize = 1 << 16;
+/// Cotangent weight of an edge; either sign in the fast tier.
 pub const EDGE_WEIGHT: f32 = 1e9;
 /// Entry of the factor, either sign; that of a Laplacian with non-negative weights is at most 1.
 pub const FACTOR_VALUE: f32 = 1e6;
 /// Inverse of a pivot.
 pub const INVERSE_PIVOT: f32 = 1e12;
-/// Quality figures.
+/// Quality and error figures.
 pub const QUALITY: f32 = 1e9;

@@ -19,10 +19,11 @@ mod tests;
 mod write;
 
 pub use baked::{
-    ArchivedBakedBasis, ArchivedBakedBlock, ArchivedBakedComponent, ArchivedBakedTier, BakedBasis, BakedBlock,
-    BakedComponent, BakedTier,
+    ArchivedBakedBasis, ArchivedBakedBlock, ArchivedBakedComponent, ArchivedBakedFast, ArchivedBakedTier,
+    ArchivedFastError, BakedBasis, BakedBlock, BakedComponent, BakedFast, BakedTier, FastError, SKIN_NODES,
+    SKIN_WEIGHT_SUM,
 };
-pub use baked_view::{BakedView, TierView};
+pub use baked_view::{BakedView, FastView, TierView};
 pub use basis::{
     ArchivedBlockRecord, ArchivedCompactBasis, ArchivedComponentRecord, ArchivedGraphConvRecord, ArchivedProvenance,
     ArchivedQuality, BlockRecord, CompactBasis, ComponentRecord, GraphConvRecord, Provenance, Quality,

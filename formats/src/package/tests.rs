@@ -64,14 +64,25 @@ fn tier_is_read_as_written(view: &TierView<'_>, tiny: &TinyTier) {
 #[test]
 fn a_second_tier_is_read_as_written() {
     let mut tiny = tiny_baked();
-    let mut fast = tiny.exact.clone();
-    fast.rest_positions[0][0] = -0.5;
-    fast.inverse_pivots[3] = 0.25;
+    let mut fast = tiny.own_nodes();
+    fast.nodes.rest_positions[0][0] = -0.5;
+    fast.nodes.inverse_pivots[3] = 0.25;
+    for weight in &mut fast.nodes.ring_weights {
+        *weight = -*weight;
+    }
+    fast.skin_nodes[3] = [8, 0, 1, 0];
+    fast.skin_weights[3] = [65_535, 0, 0, 0];
     tiny.fast = Some(fast.clone());
     let bytes = write_baked(&tiny.basis()).unwrap();
     let view = BakedView::open(&bytes).unwrap();
     tier_is_read_as_written(&view.exact(), &tiny.exact);
-    tier_is_read_as_written(&view.fast().unwrap(), &fast);
+    let read = view.fast().unwrap();
+    tier_is_read_as_written(&read.nodes(), &fast.nodes);
+    assert_eq!(read.centre(), fast.centre);
+    assert_eq!(read.rest_positions(), fast.rest_positions);
+    assert_eq!(read.skin_nodes(), fast.skin_nodes);
+    assert_eq!(read.skin_weights(), fast.skin_weights);
+    assert_eq!(read.error(), fast.error);
 }
 
 #[test]
@@ -198,7 +209,21 @@ fn records_lie_as_documented() {
         fast,
     });
     assert_eq!(baked, [0, 16, 24, 32, 40, 44, 48, 56, 64, 168]);
-    assert_eq!((size_of::<Baked>(), align_of::<Baked>()), (276, 4));
+    assert_eq!((size_of::<Baked>(), align_of::<Baked>()), (340, 4));
+    let fast = places!(ArchivedBakedFast<'static> { nodes, centre, rest_positions, skin_nodes, skin_weights, error });
+    assert_eq!(fast, [0, 104, 116, 124, 132, 140]);
+    assert_eq!(size_of::<ArchivedBakedFast<'static>>(), 168);
+    let error = places!(ArchivedFastError {
+        mixed_rms,
+        mixed_p99,
+        mixed_max,
+        single_rms,
+        single_max,
+        normal_rms,
+        mixed_poses,
+    });
+    assert_eq!(error, [0, 4, 8, 12, 16, 20, 24]);
+    assert_eq!(size_of::<ArchivedFastError>(), 28);
     let tier = places!(Tier {
         rest_positions,
         ring_offsets,

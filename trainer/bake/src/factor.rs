@@ -26,7 +26,7 @@ pub struct AnchoredLaplacian<'a> {
     pub ring_offsets: &'a [u32],
     /// Neighbours, ascending within a row, never the row itself; symmetric.
     pub ring: &'a [u32],
-    /// `c_ij`, positive, symmetric. Shape: that of `ring`.
+    /// `c_ij`, symmetric; positive, or such that the matrix is definite all the same. Shape: that of `ring`.
     pub weights: &'a [f64],
     /// The vertex that does not move.
     pub anchor_vertex: usize,

@@ -2,21 +2,25 @@
 //! into the components, everything laid out in the order in which a frame reads it.
 //!
 //! Path of data: compact package -> [`Surface`] (rings, weights) -> [`factor`] (order, factor) and [`sparse`] -> [`fold`]
-//! -> baked package, which the runtime opens without allocating.
+//! -> [`tier`], the exact one -> [`fast`], where wanted -> baked package, which the runtime opens without allocating.
 
 pub mod factor;
+pub mod fast;
 pub mod fold;
 pub mod mesh;
 pub mod sparse;
 mod surface;
+pub mod tier;
 
 use sinew_formats::package::{
-    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedTier, CompactView, OpenError, WriteError, write_baked,
+    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, CompactView, OpenError, WriteError, write_baked,
 };
 
-use factor::{AnchoredLaplacian, EliminationOrder, Factor};
-use fold::{FoldFrame, FoldedBlocks, FoldedComponent};
+use factor::EliminationOrder;
+use fast::{Fast, play::Network};
+use fold::{FoldFrame, FoldedComponent};
 pub use surface::Surface;
+use tier::Tier;
 
 /// Why a package cannot be baked.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -42,30 +46,64 @@ pub enum BakeError {
     Unreadable(#[source] OpenError),
 }
 
+/// What to bake besides the exact tier.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BakeOptions {
+    /// Nodes of the fast tier.
+    pub fast_nodes: FastNodes,
+}
+
+impl Default for BakeOptions {
+    /// A fast tier with a node for every eight vertices.
+    fn default() -> Self {
+        Self {
+            fast_nodes: FastNodes::OneIn(8),
+        }
+    }
+}
+
+/// How many nodes stand for the vertices in the fast tier.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FastNodes {
+    /// No fast tier.
+    None,
+    /// One for so many vertices; at least 1, and the format's limit caps the nodes.
+    OneIn(u32),
+}
+
 /// Bakes the compact package in `bytes`; see [`bake`].
 /// Errors: those of [`bake`], and [`BakeError::Unreadable`].
 pub fn bake_bytes(bytes: &[u8]) -> Result<AlignedBytes, BakeError> {
     bake(&CompactView::open(bytes).map_err(BakeError::Unreadable)?)
 }
 
-/// Bakes a compact package; the same bytes give the same bytes, whatever the thread count.
+/// Bakes the compact package in `bytes`; see [`bake_with`].
+/// Errors: those of [`bake_bytes`].
+pub fn bake_bytes_with(bytes: &[u8], options: &BakeOptions) -> Result<AlignedBytes, BakeError> {
+    bake_with(&CompactView::open(bytes).map_err(BakeError::Unreadable)?, options)
+}
+
+/// Bakes the exact tier alone: what a program needs that bakes and plays at once.
+/// Errors: those of [`bake_with`].
+pub fn bake(package: &CompactView<'_>) -> Result<AlignedBytes, BakeError> {
+    let options = BakeOptions {
+        fast_nodes: FastNodes::None,
+    };
+    bake_with(package, &options)
+}
+
+/// Bakes a compact package; the same bytes give the same bytes, whatever the thread count. A fast tier costs some hundred
+/// poses of the exact one: it is fitted to them, and its error is measured on others.
 /// Errors: a mesh that is not one connected graph, or a result that the format cannot hold.
 /// Source: the frame path's design: fold, order (approximate minimum degree), factor in f64, store in f32.
-pub fn bake(package: &CompactView<'_>) -> Result<AlignedBytes, BakeError> {
+pub fn bake_with(package: &CompactView<'_>, options: &BakeOptions) -> Result<AlignedBytes, BakeError> {
     let surface = Surface::of_package(package);
-    let laplacian = surface.laplacian(package.anchor_vertex() as usize);
+    let anchor_vertex = package.anchor_vertex() as usize;
+    let laplacian = surface.laplacian(anchor_vertex);
     let order = EliminationOrder::new(&laplacian)?;
-    let factor = Factor::new(&laplacian, &order)?;
-    let rings = SolverRings::new(&laplacian, &order);
-    let rest_positions: Vec<[f32; 3]> = order
-        .vertex_from_solver
-        .iter()
-        .map(|&v| package.rest_positions()[v as usize])
-        .collect();
-
     let folded = fold_package(package, &surface, &order);
     let component_counts: Vec<usize> = package.blocks().map(|block| block.component_count as usize).collect();
-    let gathered = FoldedBlocks::gather(&folded, &component_counts);
+    let exact = Tier::new(&laplacian, order, package.rest_positions(), &folded, &component_counts)?;
     let blocks: Vec<BakedBlock> = package
         .blocks()
         .map(|block| BakedBlock {
@@ -87,31 +125,34 @@ pub fn bake(package: &CompactView<'_>) -> Result<AlignedBytes, BakeError> {
             value_scale: folded.value_scale,
         })
         .collect();
+    let source = fast::Source {
+        surface: &surface,
+        anchor_vertex,
+        rest_positions: package.rest_positions(),
+        exact: &exact,
+        components: &folded,
+        network: Network {
+            blocks: &blocks,
+            components: &components,
+            rotation_scale: package.rotation_scale(),
+            stretch_scale: package.stretch_scale(),
+        },
+    };
+    let fast = match options.fast_nodes {
+        FastNodes::None => None,
+        FastNodes::OneIn(vertices) => Some(Fast::new(&source, package.vertex_count() / vertices.max(1) as usize)?),
+    };
     write_baked(&BakedBasis {
         compact_id: package.content_id(),
         faces: package.faces(),
-        solver_from_vertex: &order.solver_from_vertex,
-        vertex_from_solver: &order.vertex_from_solver,
+        solver_from_vertex: &exact.solver_from_node,
+        vertex_from_solver: &exact.node_from_solver,
         rotation_scale: package.rotation_scale(),
         stretch_scale: package.stretch_scale(),
         blocks: &blocks,
         components: &components,
-        exact: BakedTier {
-            rest_positions: &rest_positions,
-            ring_offsets: &rings.offsets,
-            ring: &rings.ring,
-            ring_weights: &rings.weights,
-            factor_offsets: &factor.offsets,
-            factor_rows: &factor.rows,
-            factor_values: &factor.values,
-            inverse_pivots: &factor.inverse_pivots,
-            support_offsets: &gathered.support_offsets,
-            support: &gathered.support,
-            entry_offsets: &gathered.entry_offsets,
-            entry_slots: &gathered.entry_slots,
-            entry_values: &gathered.entry_values,
-        },
-        fast: None,
+        exact: exact.record(),
+        fast: fast.as_ref().map(Fast::record),
     })
     .map_err(BakeError::Refused)
 }
@@ -128,39 +169,6 @@ fn fold_package(package: &CompactView<'_>, surface: &Surface, order: &Eliminatio
         solver_from_vertex: &order.solver_from_vertex,
     };
     frame.fold(&sparse::unpack_components(package), &decoders, &value_scales)
-}
-
-/// One-rings and their weights in solver order, for the right-hand side.
-struct SolverRings {
-    offsets: Vec<u32>,
-    ring: Vec<u32>,
-    weights: Vec<f32>,
-}
-
-impl SolverRings {
-    fn new(laplacian: &AnchoredLaplacian<'_>, order: &EliminationOrder) -> Self {
-        let mut rings = Self {
-            offsets: vec![0],
-            ring: Vec::new(),
-            weights: Vec::new(),
-        };
-        for &v in &order.vertex_from_solver {
-            let row = laplacian.ring_offsets[v as usize] as usize..laplacian.ring_offsets[v as usize + 1] as usize;
-            let mut entries: Vec<(u32, f32)> = row
-                .map(|e| {
-                    (
-                        order.solver_from_vertex[laplacian.ring[e] as usize],
-                        laplacian.weights[e] as f32,
-                    )
-                })
-                .collect();
-            entries.sort_unstable_by_key(|&(solver, _)| solver);
-            rings.ring.extend(entries.iter().map(|entry| entry.0));
-            rings.weights.extend(entries.iter().map(|entry| entry.1));
-            rings.offsets.push(rings.ring.len() as u32);
-        }
-        rings
-    }
 }
 
 #[cfg(any(test, feature = "fixture"))]

@@ -3,6 +3,7 @@
 use rayon::ThreadPoolBuilder;
 use sinew_formats::package::{BakedView, CompactView, FEATURE_COUNT};
 
+use super::factor::{AnchoredLaplacian, Factor};
 use super::{fixture, *};
 
 /// f64 factor stored in f32.

@@ -2,7 +2,7 @@
 //! errors bear the same names.
 
 use super::{
-    super::{BakedView, OpenError, TierView, limits},
+    super::{BakedView, FastView, OpenError, SKIN_WEIGHT_SUM, TierView, limits},
     BlockLinks, ascending_below, below, control, count, faces, finite_halves, names, offsets, positions, positive,
     same_count, tree, within,
 };
@@ -36,11 +36,57 @@ pub(in super::super) fn check(view: &BakedView<'_>) -> Result<(), OpenError> {
         control(k, component.minimum, component.maximum)?;
         positive("components.value_scale", k, component.value_scale, limits::VALUE_SCALE)?;
     }
-    tier(view, &view.exact())?;
-    if let Some(fast) = view.fast() {
-        let node_count = positions(fast.rest_positions(), 1)?;
-        count("rest_positions", node_count, 1, vertex_count)?;
-        tier(view, &fast)?;
+    tier(view, &view.exact(), 0.0)?;
+    match view.fast() {
+        Some(fast) => fast_tier(view, &fast, vertex_count),
+        None => Ok(()),
+    }
+}
+
+fn fast_tier(view: &BakedView<'_>, fast: &FastView<'_>, vertex_count: usize) -> Result<(), OpenError> {
+    let nodes = fast.nodes();
+    let node_count = positions(nodes.rest_positions(), 1)?;
+    count("rest_positions", node_count, 1, vertex_count.min(limits::FAST_NODES))?;
+    // A weight between two nodes is what is left of the mesh's, and may have either sign.
+    tier(view, &nodes, -limits::EDGE_WEIGHT)?;
+    for coordinate in fast.centre() {
+        within("fast.centre", 0, coordinate, -limits::POSITION, limits::POSITION)?;
+    }
+    let (exact, order) = (view.exact().rest_positions(), view.solver_from_vertex());
+    same_count("fast.rest_positions", fast.rest_positions().len(), vertex_count)?;
+    for (v, (position, &solver)) in fast.rest_positions().iter().zip(order).enumerate() {
+        if position.map(f32::to_bits) != exact[solver as usize].map(f32::to_bits) {
+            return Err(OpenError::RestDiffers { vertex: v });
+        }
+    }
+    skin(fast, vertex_count, node_count)?;
+    let error = fast.error();
+    let figures = [
+        ("fast.error.mixed_rms", error.mixed_rms),
+        ("fast.error.mixed_p99", error.mixed_p99),
+        ("fast.error.mixed_max", error.mixed_max),
+        ("fast.error.single_rms", error.single_rms),
+        ("fast.error.single_max", error.single_max),
+        ("fast.error.normal_rms", error.normal_rms),
+    ];
+    for (field, figure) in figures {
+        within(field, 0, figure, 0.0, limits::QUALITY)?;
+    }
+    Ok(())
+}
+
+fn skin(fast: &FastView<'_>, vertex_count: usize, node_count: usize) -> Result<(), OpenError> {
+    let (nodes, weights) = (fast.skin_nodes(), fast.skin_weights());
+    same_count("skin_nodes", nodes.len(), vertex_count)?;
+    same_count("skin_weights", weights.len(), vertex_count)?;
+    for (v, (row, weights)) in nodes.iter().zip(weights).enumerate() {
+        for &node in row {
+            below("skin_nodes", v, u32::from(node), node_count)?;
+        }
+        let sum = weights.iter().map(|&weight| u32::from(weight)).sum();
+        if sum != SKIN_WEIGHT_SUM {
+            return Err(OpenError::SkinWeightSum { vertex: v, sum });
+        }
     }
     Ok(())
 }
@@ -63,14 +109,14 @@ fn permutation(view: &BakedView<'_>, vertex_count: usize) -> Result<(), OpenErro
 }
 
 /// A tier whose positions are proved.
-fn tier(view: &BakedView<'_>, tier: &TierView<'_>) -> Result<(), OpenError> {
-    rings(tier)?;
+fn tier(view: &BakedView<'_>, tier: &TierView<'_>, least_weight: f32) -> Result<(), OpenError> {
+    rings(tier, least_weight)?;
     factor(tier)?;
     supports(view, tier)?;
     entries(view, tier)
 }
 
-fn rings(tier: &TierView<'_>) -> Result<(), OpenError> {
+fn rings(tier: &TierView<'_>, least_weight: f32) -> Result<(), OpenError> {
     let node_count = tier.node_count();
     let (ring, weights) = (tier.ring(), tier.ring_weights());
     count("ring", ring.len(), 0, limits::RING_ENTRIES)?;
@@ -82,7 +128,7 @@ fn rings(tier: &TierView<'_>) -> Result<(), OpenError> {
     }
     for v in 0..node_count {
         for entry in row(v) {
-            within("ring_weights", entry, weights[entry], 0.0, limits::EDGE_WEIGHT)?;
+            within("ring_weights", entry, weights[entry], least_weight, limits::EDGE_WEIGHT)?;
             let other = row(ring[entry] as usize);
             let back = ring[other.clone()]
                 .binary_search(&(v as u32))

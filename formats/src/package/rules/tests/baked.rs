@@ -184,22 +184,23 @@ fn support_and_entry_rules() {
     baked(|t| t.exact.entry_values[7][0] = HALF_NAN, not_finite("entry_values", 7));
 }
 
+fn fast(damage: impl Fn(&mut TinyFast), expected: OpenError) {
+    baked(
+        |t| {
+            let mut tier = t.own_nodes();
+            damage(&mut tier);
+            t.fast = Some(tier);
+        },
+        expected,
+    );
+}
+
 /// The same checks run on both tiers: one rule of each kind shows that they do.
 #[test]
-fn rules_of_the_fast_tier() {
-    let fast = |damage: fn(&mut TinyTier), expected| {
-        baked(
-            |t| {
-                let mut tier = t.exact.clone();
-                damage(&mut tier);
-                t.fast = Some(tier);
-            },
-            expected,
-        );
-    };
+fn rules_of_the_fast_tiers_nodes() {
     let field = "rest_positions";
     fast(
-        |t| t.rest_positions.clear(),
+        |t| t.nodes.rest_positions.clear(),
         TooFew {
             field,
             least: 1,
@@ -207,10 +208,48 @@ fn rules_of_the_fast_tier() {
         },
     );
     let (limit, actual) = (V as usize, V as usize + 1);
-    fast(|t| t.rest_positions.push([0.0; 3]), TooMany { field, limit, actual });
-    fast(|t| t.rest_positions[2][1] = f32::NAN, not_finite(field, 2));
-    fast(|t| t.ring_weights[3] = f32::NAN, not_finite("ring_weights", 3));
-    fast(|t| t.factor_values[2] = f32::NAN, not_finite("factor_values", 2));
-    fast(|t| t.support[0] = V, beyond("support", 0, V, V));
-    fast(|t| t.entry_values[7][0] = HALF_NAN, not_finite("entry_values", 7));
+    fast(
+        |t| t.nodes.rest_positions.push([0.0; 3]),
+        TooMany { field, limit, actual },
+    );
+    fast(|t| t.nodes.rest_positions[2][1] = f32::NAN, not_finite(field, 2));
+    fast(|t| t.nodes.ring_weights[3] = f32::NAN, not_finite("ring_weights", 3));
+    fast(|t| t.nodes.factor_values[2] = f32::NAN, not_finite("factor_values", 2));
+    fast(|t| t.nodes.support[0] = V, beyond("support", 0, V, V));
+    fast(|t| t.nodes.entry_values[7][0] = HALF_NAN, not_finite("entry_values", 7));
+}
+
+#[test]
+fn skin_rules() {
+    let v = u64::from(V);
+    fast(|t| t.skin_nodes.truncate(8), counts("skin_nodes", v, v - 1));
+    fast(|t| t.skin_weights.push([0; 4]), counts("skin_weights", v, v + 1));
+    fast(|t| t.skin_nodes[5][3] = V as u16, beyond("skin_nodes", 5, V, V));
+    let sum = 65_534;
+    fast(|t| t.skin_weights[7][1] -= 1, SkinWeightSum { vertex: 7, sum });
+    let sum = 4 * 65_535;
+    fast(|t| t.skin_weights[0] = [u16::MAX; 4], SkinWeightSum { vertex: 0, sum });
+}
+
+#[test]
+fn the_fast_tier_has_the_exact_rest_shape_and_finite_figures() {
+    let v = u64::from(V);
+    fast(|t| t.rest_positions.truncate(8), counts("fast.rest_positions", v, v - 1));
+    fast(|t| t.rest_positions[6][2] += 0.5, RestDiffers { vertex: 6 });
+    fast(|t| t.rest_positions.swap(1, 2), RestDiffers { vertex: 1 });
+    fast(|t| t.centre[1] = f32::INFINITY, not_finite("fast.centre", 0));
+    fast(|t| t.error.mixed_rms = f32::NAN, not_finite("fast.error.mixed_rms", 0));
+    fast(|t| t.error.single_max = f32::NAN, not_finite("fast.error.single_max", 0));
+    let (least, greatest, value) = (0.0, limits::QUALITY, -1.0);
+    let negative = |field| OutOfRange {
+        field,
+        index: 0,
+        value,
+        least,
+        greatest,
+    };
+    fast(|t| t.error.mixed_p99 = value, negative("fast.error.mixed_p99"));
+    fast(|t| t.error.mixed_max = value, negative("fast.error.mixed_max"));
+    fast(|t| t.error.single_rms = value, negative("fast.error.single_rms"));
+    fast(|t| t.error.normal_rms = value, negative("fast.error.normal_rms"));
 }

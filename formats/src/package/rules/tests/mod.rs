@@ -6,7 +6,7 @@ mod compact;
 use alloc::string::String;
 
 use super::super::fixture::{
-    COMPONENT_COUNT, TinyBaked, TinyCompact, TinyTier, VERTEX_COUNT, tiny_baked, tiny_compact,
+    COMPONENT_COUNT, TinyBaked, TinyCompact, TinyFast, VERTEX_COUNT, tiny_baked, tiny_compact,
 };
 use super::super::*;
 use OpenError::*;

@@ -1,0 +1,145 @@
+//! The fast tier: a graph of N nodes on the surface stands for its V vertices. Each vertex follows four nodes, which carry
+//! the network's deformation gradients and are moved by a small system of their own.
+//!
+//! Path of data: exact [`Tier`] -> [`nodes`] (which vertices) -> [`skin`] (four weights a vertex, fitted to poses of the
+//! exact tier) -> [`graph`] (the mesh's energy on the nodes) -> a [`Tier`] of the nodes -> [`measure`] (its error).
+//!
+//! Sources: embedded deformation graphs (Sumner, Schmid, Pauly 2007); weights fitted to examples as for skinning
+//! decomposition (Le and Deng 2012), but with the nodes' transforms given by the network; the coarse matrix is the Galerkin
+//! product of multigrid methods. What was measured on the way is in [`skin`] and [`graph`].
+
+pub mod graph;
+pub mod measure;
+pub mod nodes;
+pub mod play;
+pub mod skin;
+
+use sinew_formats::package::{BakedFast, FastError, SKIN_NODES, limits};
+
+use crate::BakeError;
+use crate::factor::EliminationOrder;
+use crate::fold::FoldedComponent;
+use crate::tier::Tier;
+use graph::NodeGraph;
+use measure::Measure;
+use nodes::SurfaceGraph;
+use play::{Network, Player};
+use skin::Skin;
+
+/// Chance of a control to move in a mixed pose: a performer holds some of them, not all at once.
+pub const MIXED_SHARE: f64 = 0.25;
+
+/// A fast tier, owned.
+#[derive(Debug)]
+pub struct Fast {
+    nodes: Tier,
+    centre: [f32; 3],
+    rest_positions: Vec<[f32; 3]>,
+    skin_nodes: Vec<[u16; SKIN_NODES]>,
+    skin_weights: Vec<[u16; SKIN_NODES]>,
+    /// What was measured.
+    pub error: FastError,
+}
+
+/// The mesh that a fast tier is made for.
+#[derive(Debug, Clone, Copy)]
+pub struct Source<'a> {
+    /// Connectivity, rest shape and edge weights, source order.
+    pub surface: &'a crate::Surface,
+    /// The vertex that the solve holds.
+    pub anchor_vertex: usize,
+    /// Shape: `[V]`, source order.
+    pub rest_positions: &'a [[f32; 3]],
+    /// The exact tier; its nodes are the vertices in source order.
+    pub exact: &'a Tier,
+    /// The exact tier's components, in its solver order. Shape: `[K]`.
+    pub components: &'a [FoldedComponent],
+    /// Blocks, controls and scales.
+    pub network: Network<'a>,
+}
+
+impl Fast {
+    /// Makes a tier of about `node_count` nodes, at least one and at most those the format allows, and measures it.
+    /// Deterministic, whatever the thread count. Errors: those of [`Tier::new`].
+    pub fn new(source: &Source<'_>, node_count: usize) -> Result<Self, BakeError> {
+        let surface = SurfaceGraph::new(&source.surface.topology, &source.surface.rest);
+        let node_count = node_count.clamp(1, limits::FAST_NODES);
+        let nodes = surface.farthest_points(source.anchor_vertex, node_count);
+        let exact = Player::new(source.network, source.exact);
+        let skin = Skin::fit(source, &surface, &nodes, &exact);
+
+        let graph = NodeGraph::new(source.surface, &skin, nodes.len());
+        let laplacian = graph.laplacian();
+        let order = EliminationOrder::new(&laplacian)?;
+        let components = at_nodes(source, &nodes, &order.solver_from_vertex);
+        let rest: Vec<[f32; 3]> = nodes.iter().map(|&v| source.rest_positions[v as usize]).collect();
+        let component_counts = source.network.component_counts();
+        let tier = Tier::new(&laplacian, order, &rest, &components, &component_counts)?;
+
+        let solver_from_node = &tier.solver_from_node;
+        let in_solver_order = |row: &[u16; SKIN_NODES]| row.map(|node| solver_from_node[usize::from(node)] as u16);
+        let mut fast = Self {
+            centre: middle(source.rest_positions),
+            rest_positions: source.rest_positions.to_vec(),
+            skin_nodes: skin.nodes.iter().map(in_solver_order).collect(),
+            skin_weights: skin.weights,
+            error: FastError {
+                mixed_rms: 0.0,
+                mixed_p99: 0.0,
+                mixed_max: 0.0,
+                single_rms: 0.0,
+                single_max: 0.0,
+                normal_rms: 0.0,
+                mixed_poses: 0,
+            },
+            nodes: tier,
+        };
+        fast.error = Measure::new(source, &exact, &fast).error();
+        Ok(fast)
+    }
+
+    /// Borrowed, ready to be written.
+    pub fn record(&self) -> BakedFast<'_> {
+        BakedFast {
+            nodes: self.nodes.record(),
+            centre: self.centre,
+            rest_positions: &self.rest_positions,
+            skin_nodes: &self.skin_nodes,
+            skin_weights: &self.skin_weights,
+            error: self.error,
+        }
+    }
+}
+
+/// The components where the nodes are, in the nodes' solver order.
+fn at_nodes(source: &Source<'_>, nodes: &[u32], solver_from_node: &[u32]) -> Vec<FoldedComponent> {
+    let mut node_from_exact = vec![None; source.rest_positions.len()];
+    for (&vertex, &solver) in nodes.iter().zip(solver_from_node) {
+        node_from_exact[source.exact.solver_from_node[vertex as usize] as usize] = Some(solver);
+    }
+    let restricted = source.components.iter().map(|component| {
+        let entries = component.solver_indices.iter().zip(&component.values);
+        let mut entries: Vec<_> = entries
+            .filter_map(|(&solver, &value)| node_from_exact[solver as usize].map(|node: u32| (node, value)))
+            .collect();
+        entries.sort_unstable_by_key(|&(node, _)| node);
+        let (solver_indices, values) = entries.into_iter().unzip();
+        FoldedComponent {
+            solver_indices,
+            values,
+            value_scale: component.value_scale,
+        }
+    });
+    restricted.collect()
+}
+
+/// Middle of the bounding box.
+fn middle(positions: &[[f32; 3]]) -> [f32; 3] {
+    core::array::from_fn(|c| {
+        let coordinates = positions.iter().map(|p| p[c]);
+        let (low, high) = coordinates.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), x| {
+            (low.min(x), high.max(x))
+        });
+        0.5 * low + 0.5 * high
+    })
+}

@@ -1,0 +1,223 @@
+//! Plays a tier in f64, on the numbers that are stored: what the skin is fitted to and the error measured against.
+
+use half::f16;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use sinew_formats::package::{BakedBlock, BakedComponent, FEATURE_COUNT};
+
+use crate::tier::Tier;
+
+/// `T - I` of a node, row-major.
+pub type Gradient = [f64; 9];
+
+/// Blocks, controls and scales: what all tiers share.
+#[derive(Debug, Clone, Copy)]
+pub struct Network<'a> {
+    /// Shape: `[B]`.
+    pub blocks: &'a [BakedBlock],
+    /// Shape: `[K]`.
+    pub components: &'a [BakedComponent<'a>],
+    /// Network value to radians.
+    pub rotation_scale: f32,
+    /// Network value to stretch.
+    pub stretch_scale: f32,
+}
+
+impl Network<'_> {
+    /// Components of each block. Shape: `[B]`.
+    pub fn component_counts(&self) -> Vec<usize> {
+        self.blocks.iter().map(|block| block.component_count as usize).collect()
+    }
+
+    /// Mixed poses: every control moves with the chance `share`, and then stands anywhere between its stops, evenly.
+    /// Shape: `[count][K]`.
+    pub fn mixed_poses(&self, seed: u64, count: usize, share: f64) -> Vec<Vec<f64>> {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let mut draw = |component: &BakedComponent<'_>| {
+            let (chance, place): (f64, f64) = (random.random(), random.random());
+            let (minimum, maximum) = (f64::from(component.minimum), f64::from(component.maximum));
+            if chance < share { minimum + (maximum - minimum) * place } else { 0.0 }
+        };
+        (0..count)
+            .map(|_| self.components.iter().map(&mut draw).collect())
+            .collect()
+    }
+
+    /// Single poses: each control at each of its stops that is not rest, the others at rest.
+    pub fn single_poses(&self) -> Vec<Vec<f64>> {
+        let stops = self.components.iter().enumerate();
+        let stops = stops.flat_map(|(k, component)| [(k, component.minimum), (k, component.maximum)]);
+        let at_stop = |(k, stop): (usize, f32)| {
+            let mut weights = vec![0.0; self.components.len()];
+            weights[k] = f64::from(stop);
+            weights
+        };
+        stops.filter(|&(_, stop)| stop != 0.0).map(at_stop).collect()
+    }
+}
+
+/// What a tier makes of a pose. Shape: both `[N]`, in the order that the function says.
+#[derive(Debug, Clone)]
+pub struct Pose {
+    /// Of each node.
+    pub gradients: Vec<Gradient>,
+    /// Of each node, units of the source.
+    pub displacement: Vec<[f64; 3]>,
+}
+
+/// A tier and the network on it.
+#[derive(Debug)]
+pub struct Player<'a> {
+    network: Network<'a>,
+    tier: &'a Tier,
+    /// The entries, widened, with their scales. Shape: that of the tier's.
+    values: Vec<[f64; FEATURE_COUNT]>,
+}
+
+impl<'a> Player<'a> {
+    /// Widens the entries.
+    pub fn new(network: Network<'a>, tier: &'a Tier) -> Self {
+        let offsets = tier.folded.entry_offsets.windows(2);
+        let values = offsets.zip(network.components).flat_map(|(entries, component)| {
+            let scale = f64::from(component.value_scale);
+            let values = &tier.folded.entry_values[entries[0] as usize..entries[1] as usize];
+            values
+                .iter()
+                .map(move |halves| halves.map(|bits| scale * f16::from_bits(bits).to_f64()))
+        });
+        Self {
+            network,
+            tier,
+            values: values.collect(),
+        }
+    }
+
+    /// Plays poses in parallel; the result does not depend on how. Node order. Shape: `[poses]`.
+    pub fn play_all(&self, poses: &[Vec<f64>]) -> Vec<Pose> {
+        poses.par_iter().map(|weights| self.play(weights)).collect()
+    }
+
+    /// One pose, in the tier's node order. Shape: `weights` `[K]`.
+    pub fn play(&self, weights: &[f64]) -> Pose {
+        let pose = self.play_in_solver_order(weights);
+        let order = || self.tier.solver_from_node.iter().map(|&solver| solver as usize);
+        Pose {
+            gradients: order().map(|solver| pose.gradients[solver]).collect(),
+            displacement: order().map(|solver| pose.displacement[solver]).collect(),
+        }
+    }
+
+    /// One pose, in the tier's solver order. Shape: `weights` `[K]`.
+    pub fn play_in_solver_order(&self, weights: &[f64]) -> Pose {
+        let features = self.features(weights);
+        let rotation = f64::from(self.network.rotation_scale);
+        let stretch = f64::from(self.network.stretch_scale);
+        let gradients: Vec<Gradient> = features
+            .iter()
+            .map(|x| gradient(&core::array::from_fn(|c| x[c] * if c < 3 { rotation } else { stretch })))
+            .collect();
+        let mut displacement = self.right_hand_side(&gradients);
+        self.substitute(&mut displacement);
+        Pose {
+            gradients,
+            displacement,
+        }
+    }
+
+    fn features(&self, weights: &[f64]) -> Vec<[f64; FEATURE_COUNT]> {
+        let folded = &self.tier.folded;
+        let mut features = vec![[0.0; FEATURE_COUNT]; self.tier.node_count()];
+        for (b, block) in self.network.blocks.iter().enumerate() {
+            let support = &folded.support[folded.support_offsets[b] as usize..folded.support_offsets[b + 1] as usize];
+            let mut sums = vec![[0.0; FEATURE_COUNT]; support.len()];
+            let first = block.first_component as usize;
+            for k in first..first + block.component_count as usize {
+                if weights[k] == 0.0 {
+                    continue;
+                }
+                for e in folded.entry_offsets[k] as usize..folded.entry_offsets[k + 1] as usize {
+                    let sum = &mut sums[folded.entry_slots[e] as usize];
+                    for c in 0..FEATURE_COUNT {
+                        sum[c] += weights[k] * self.values[e][c];
+                    }
+                }
+            }
+            let bias = block.bias.map(f64::from);
+            let rest = bias.map(f64::tanh);
+            for (&node, sum) in support.iter().zip(&sums).filter(|(_, sum)| **sum != [0.0; FEATURE_COUNT]) {
+                for c in 0..FEATURE_COUNT {
+                    features[node as usize][c] += (bias[c] + sum[c]).tanh() - rest[c];
+                }
+            }
+        }
+        features
+    }
+
+    fn right_hand_side(&self, gradients: &[Gradient]) -> Vec<[f64; 3]> {
+        let (rings, rest) = (&self.tier.rings, &self.tier.rest_positions);
+        let row = |i: usize| {
+            let mut sum = [0.0; 3];
+            for e in rings.offsets[i] as usize..rings.offsets[i + 1] as usize {
+                let j = rings.ring[e] as usize;
+                let edge = core::array::from_fn(|c| f64::from(rest[i][c]) - f64::from(rest[j][c]));
+                let both = core::array::from_fn(|n| gradients[i][n] + gradients[j][n]);
+                let turned = times(&both, &edge);
+                for c in 0..3 {
+                    sum[c] += 0.5 * f64::from(rings.weights[e]) * turned[c];
+                }
+            }
+            sum
+        };
+        (0..gradients.len()).map(row).collect()
+    }
+
+    /// `F D F^T x = b`, in place.
+    fn substitute(&self, b: &mut [[f64; 3]]) {
+        let factor = &self.tier.factor;
+        let column = |j: usize| factor.offsets[j] as usize..factor.offsets[j + 1] as usize;
+        for j in 0..b.len() {
+            let x = b[j];
+            for e in column(j) {
+                let row = &mut b[factor.rows[e] as usize];
+                for c in 0..3 {
+                    row[c] -= f64::from(factor.values[e]) * x[c];
+                }
+            }
+        }
+        for j in (0..b.len()).rev() {
+            let mut x = b[j].map(|x| x * f64::from(factor.inverse_pivots[j]));
+            for e in column(j) {
+                let row = &b[factor.rows[e] as usize];
+                for c in 0..3 {
+                    x[c] -= f64::from(factor.values[e]) * row[c];
+                }
+            }
+            b[j] = x;
+        }
+    }
+}
+
+/// A matrix times a vector.
+pub fn times(matrix: &Gradient, x: &[f64; 3]) -> [f64; 3] {
+    core::array::from_fn(|row| matrix[3 * row] * x[0] + matrix[3 * row + 1] * x[1] + matrix[3 * row + 2] * x[2])
+}
+
+/// `exp([r]x) S - I` of a log-rotation, radians, and a stretch less identity.
+fn gradient(x: &[f64; FEATURE_COUNT]) -> Gradient {
+    let r = nalgebra::Vector3::new(x[0], x[1], x[2]);
+    let rotation = nalgebra::Rotation3::new(r).into_inner();
+    let stretch = nalgebra::Matrix3::new(
+        1.0 + x[3],
+        x[4],
+        x[5],
+        x[4],
+        1.0 + x[6],
+        x[7],
+        x[5],
+        x[7],
+        1.0 + x[8],
+    );
+    let d = rotation * stretch - nalgebra::Matrix3::identity();
+    core::array::from_fn(|n| d[(n / 3, n % 3)])
+}
