@@ -206,10 +206,10 @@ impl<'a> Tier<'a> {
 
     pub(crate) fn factor(&self) -> Factor<'a> {
         Factor {
-            offsets: self.nodes.factor_offsets(),
-            rows: self.nodes.factor_rows(),
-            values: self.nodes.factor_values(),
-            inverse_pivots: self.nodes.inverse_pivots(),
+            offsets: self.nodes.tile_offsets(),
+            rows: self.nodes.tile_rows(),
+            tiles: self.nodes.tiles(),
+            inverse_diagonals: self.nodes.inverse_diagonals(),
         }
     }
 }

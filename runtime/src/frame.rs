@@ -68,7 +68,7 @@ impl Frame<'_> {
             let tier = self.basis.exact();
             blend(&tier, workspace.weights, workspace.pre_activations, workspace.features);
             decode(&tier, workspace.features, workspace.gradients);
-            solve(&tier, workspace.gradients, workspace.displacement);
+            solve(workspace.kernels, &tier, workspace.gradients, workspace.displacement);
             FrameOutcome::Solved
         };
         let emitted = emit(self.basis, workspace.displacement, self.positions);

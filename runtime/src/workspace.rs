@@ -7,6 +7,7 @@ use sinew_formats::package::FEATURE_COUNT;
 use crate::basis::Basis;
 use crate::error::{FrameError, WorkspaceError};
 use crate::simd::Kernels;
+use crate::simd::scalar::poisson::{BLOCK, Gradient, Lane};
 
 /// Start of every buffer: a cache line, and the widest vector register.
 const ALIGNMENT: usize = 64;
@@ -21,7 +22,7 @@ pub struct WorkspaceLayout {
 }
 
 impl WorkspaceLayout {
-    /// Layout for `basis`: about 132 bytes a vertex.
+    /// Layout for `basis`: about 152 bytes a vertex.
     pub fn for_basis(basis: &Basis<'_>) -> Self {
         let sections = Sections::of(basis);
         Self {
@@ -54,12 +55,18 @@ impl Sections {
         }
     }
 
+    /// Nodes of whole blocks: the solve runs on tiles.
+    fn padded_nodes(&self) -> usize {
+        self.nodes.next_multiple_of(BLOCK)
+    }
+
     /// The limits of the format keep this under a gigabyte, which fits 32 bits.
     fn size_bytes(&self) -> usize {
         section_bytes::<f32>(self.components)
-            + 2 * section_bytes::<[f32; FEATURE_COUNT]>(self.nodes)
+            + section_bytes::<[f32; FEATURE_COUNT]>(self.nodes)
             + section_bytes::<[f32; FEATURE_COUNT]>(self.largest_support)
-            + 2 * section_bytes::<[f32; 3]>(self.nodes)
+            + section_bytes::<Gradient>(self.nodes)
+            + 2 * section_bytes::<Lane>(self.padded_nodes())
     }
 }
 
@@ -78,14 +85,14 @@ pub struct Workspace<'w> {
     pub(crate) weights: &'w mut [f32],
     /// Features of the pose, network units. Shape: `[V]`, solver order.
     pub(crate) features: &'w mut [[f32; FEATURE_COUNT]],
-    /// Displacement of the pose. Shape: `[V]`, solver order.
-    pub(crate) displacement: &'w mut [[f32; 3]],
+    /// Displacement of the pose, zero after the last node. Shape: `[4 T]`, solver order.
+    pub(crate) displacement: &'w mut [Lane],
     /// Scratch: a block's blend. Shape: `[largest support]`.
     pub(crate) pre_activations: &'w mut [[f32; FEATURE_COUNT]],
-    /// Scratch: `D = T - I` or its derivative. Shape: `[V]`, solver order.
-    pub(crate) gradients: &'w mut [[f32; FEATURE_COUNT]],
-    /// Scratch: a solve that is not the pose's. Shape: `[V]`, solver order.
-    pub(crate) solution: &'w mut [[f32; 3]],
+    /// Scratch: `D = T - I` or its derivative. Shape: `[N]`, solver order.
+    pub(crate) gradients: &'w mut [Gradient],
+    /// Scratch: a solve that is not the pose's. Shape: that of `displacement`.
+    pub(crate) solution: &'w mut [Lane],
 }
 
 impl<'w> Workspace<'w> {
@@ -119,10 +126,10 @@ impl<'w> Workspace<'w> {
         memory.fill(0);
         let (weights, memory) = carve(memory, sections.components);
         let (features, memory) = carve(memory, sections.nodes);
-        let (displacement, memory) = carve(memory, sections.nodes);
+        let (displacement, memory) = carve(memory, sections.padded_nodes());
         let (pre_activations, memory) = carve(memory, sections.largest_support);
         let (gradients, memory) = carve(memory, sections.nodes);
-        let (solution, _) = carve(memory, sections.nodes);
+        let (solution, _) = carve(memory, sections.padded_nodes());
         let basis_id = basis.id();
         Ok(Self {
             basis_id,
@@ -155,7 +162,7 @@ impl<'w> Workspace<'w> {
     pub(crate) fn rest(&mut self) {
         self.weights.fill(0.0);
         self.features.fill([0.0; FEATURE_COUNT]);
-        self.displacement.fill([0.0; 3]);
+        self.displacement.fill([0.0; 4]);
     }
 
     /// Refuses a basis other than the one this workspace was made for.
@@ -243,7 +250,7 @@ mod tests {
         let package = Package::small(1);
         let basis = open(&package);
         let layout = WorkspaceLayout::for_basis(&basis);
-        let exact = 4 * basis.component_count() + 132 * basis.vertex_count();
+        let exact = 4 * basis.component_count() + 152 * basis.vertex_count();
         assert!(
             layout.size_bytes <= exact + 6 * layout.alignment,
             "{} {exact}",

@@ -20,7 +20,7 @@ mod write;
 
 pub use baked::{
     ArchivedBakedBasis, ArchivedBakedBlock, ArchivedBakedComponent, ArchivedBakedTier, BakedBasis, BakedBlock,
-    BakedComponent, BakedTier,
+    BakedComponent, BakedTier, OnCacheLines, TILE_ENTRIES, TILE_SIDE,
 };
 pub use baked_view::{BakedView, TierView};
 pub use basis::{
