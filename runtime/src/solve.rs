@@ -26,9 +26,7 @@ pub(crate) fn right_hand_side(
 ) {
     match kernels {
         #[cfg(target_arch = "x86_64")]
-        Kernels::Avx2 => avx2::poisson::right_hand_side(rings, rest, gradients, b),
-        #[cfg(target_arch = "x86_64")]
-        Kernels::Avx512 => avx512::poisson::right_hand_side(rings, rest, gradients, b),
+        Kernels::Avx2 | Kernels::Avx512 => avx2::poisson::right_hand_side(rings, rest, gradients, b),
         _ => scalar::poisson::right_hand_side(rings, rest, gradients, b),
     }
 }
