@@ -2,10 +2,13 @@
 
 use core::fmt;
 
-use sinew_formats::package::{BakedBlock, BakedView, FEATURE_COUNT, NONE, OpenError, TierView};
+use sinew_formats::package::{
+    BakedBlock, BakedView, FEATURE_COUNT, FastError, FastView, NONE, OpenError, TierView,
+};
 
 use crate::simd::scalar::gradient::FeatureScales;
 use crate::simd::scalar::poisson::{Factor, Rings};
+use crate::simd::scalar::skin::Skin;
 
 /// A baked package, checked. Borrows the bytes; cheap to copy; may be shared between threads, each with its own workspace.
 #[derive(Clone, Copy)]
@@ -133,11 +136,53 @@ impl<'a> Basis<'a> {
         self.view.stretch_scale()
     }
 
+    /// Nodes of the fast tier, where the package has one.
+    pub fn fast_node_count(&self) -> Option<usize> {
+        self.view.fast().map(|fast| fast.nodes().node_count())
+    }
+
+    /// How far the fast tier is from the exact one, measured when the package was baked.
+    pub fn fast_error(&self) -> Option<FastError> {
+        self.view.fast().map(|fast| fast.error())
+    }
+
     /// The tier whose nodes are the vertices.
     pub(crate) fn exact(&self) -> Tier<'a> {
         Tier {
             basis: *self,
             nodes: self.view.exact(),
+        }
+    }
+
+    /// The fast tier, where the package has one.
+    pub(crate) fn fast(&self) -> Option<Fast<'a>> {
+        self.view.fast().map(|view| Fast { basis: *self, view })
+    }
+}
+
+/// The fast tier of a basis.
+#[derive(Clone, Copy)]
+pub(crate) struct Fast<'a> {
+    basis: Basis<'a>,
+    view: FastView<'a>,
+}
+
+impl<'a> Fast<'a> {
+    /// What blend, decode and solve read.
+    pub(crate) fn nodes(&self) -> Tier<'a> {
+        Tier {
+            basis: self.basis,
+            nodes: self.view.nodes(),
+        }
+    }
+
+    /// How the vertices follow the nodes.
+    pub(crate) fn skin(&self) -> Skin<'a> {
+        Skin {
+            rest: self.view.rest_positions(),
+            centre: self.view.centre(),
+            nodes: self.view.skin_nodes(),
+            weights: self.view.skin_weights(),
         }
     }
 }
@@ -206,10 +251,10 @@ impl<'a> Tier<'a> {
 
     pub(crate) fn factor(&self) -> Factor<'a> {
         Factor {
-            offsets: self.nodes.factor_offsets(),
-            rows: self.nodes.factor_rows(),
-            values: self.nodes.factor_values(),
-            inverse_pivots: self.nodes.inverse_pivots(),
+            offsets: self.nodes.tile_offsets(),
+            rows: self.nodes.tile_rows(),
+            tiles: self.nodes.tiles(),
+            inverse_diagonals: self.nodes.inverse_diagonals(),
         }
     }
 }

@@ -3,8 +3,9 @@
 use crate::basis::Tier;
 use crate::simd::scalar::blend::Features;
 use crate::simd::scalar::gradient;
+use crate::simd::scalar::poisson::Gradient;
 
 /// `D = T - I` of every node. Shape: both `[N]`.
-pub(crate) fn decode(tier: &Tier<'_>, features: &[Features], gradients: &mut [Features]) {
+pub(crate) fn decode(tier: &Tier<'_>, features: &[Features], gradients: &mut [Gradient]) {
     gradient::gradients(tier.scales(), features, gradients);
 }

@@ -45,6 +45,8 @@ pub enum FrameError {
     },
     /// The workspace was made for another basis.
     ForeignWorkspace,
+    /// The job runs on the exact tier, and the workspace was made for the fast one.
+    NeedsExactTier,
     /// The controls belong to another basis.
     ForeignControls,
     /// There is no such component.
@@ -82,6 +84,7 @@ impl fmt::Display for FrameError {
                 )
             }
             Self::ForeignWorkspace => write!(out, "the workspace was made for another basis; make one for this basis"),
+            Self::NeedsExactTier => write!(out, "this job needs a workspace of the exact tier"),
             Self::ForeignControls => write!(out, "the controls belong to another basis; make some for this basis"),
             Self::NoSuchComponent {
                 component,
@@ -166,6 +169,8 @@ pub enum WorkspaceError {
         /// Bytes given.
         actual_bytes: usize,
     },
+    /// The package has no fast tier.
+    NoFastTier,
     /// This processor lacks the instructions.
     KernelsMissing {
         /// The kernels asked for.
@@ -187,6 +192,7 @@ impl fmt::Display for WorkspaceError {
                     "the workspace needs {required_bytes} bytes here and got {actual_bytes}"
                 )
             }
+            Self::NoFastTier => write!(out, "the package has no fast tier; bake it with one, or use the exact tier"),
             Self::KernelsMissing { kernels } => {
                 write!(
                     out,

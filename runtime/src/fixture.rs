@@ -1,5 +1,6 @@
 //! Small baked packages for unit tests: a grid, a hand-made component tree and a dense factor.
 
+use core::cmp::Ordering;
 use std::format;
 use std::string::String;
 use std::vec;
@@ -10,7 +11,7 @@ use sinew_formats::package::{AlignedBytes, BakedBasis, BakedBlock, BakedComponen
 
 use crate::basis::Basis;
 use crate::simd::scalar::naive::Noise;
-use crate::simd::scalar::poisson::{Factor, Rings};
+use crate::simd::scalar::poisson::{BLOCK, Factor, Rings};
 use crate::workspace::{Workspace, WorkspaceLayout};
 
 /// A bumpy grid of triangles in a scrambled solver order, every edge of another weight.
@@ -112,8 +113,8 @@ fn gcd(a: u32, b: u32) -> u32 {
 pub(crate) struct DenseFactor {
     pub(crate) offsets: Vec<u32>,
     pub(crate) rows: Vec<u32>,
-    pub(crate) values: Vec<f32>,
-    pub(crate) inverse_pivots: Vec<f32>,
+    pub(crate) tiles: Vec<[f32; 16]>,
+    pub(crate) inverse_diagonals: Vec<[f32; 16]>,
 }
 
 impl DenseFactor {
@@ -121,38 +122,89 @@ impl DenseFactor {
         Factor {
             offsets: &self.offsets,
             rows: &self.rows,
-            values: &self.values,
-            inverse_pivots: &self.inverse_pivots,
+            tiles: &self.tiles,
+            inverse_diagonals: &self.inverse_diagonals,
         }
     }
 }
 
-/// `F D F^T` of a dense symmetric matrix, zeros left out.
+/// `F D F^T` of a dense symmetric matrix by scalars, gathered into tiles; zero tiles left out.
 pub(crate) fn factorise(matrix: &[Vec<f64>]) -> DenseFactor {
     let count = matrix.len();
-    let mut a = matrix.to_vec();
+    let padded = count.next_multiple_of(BLOCK);
+    let mut a = vec![vec![0.0; padded]; padded];
+    for i in 0..padded {
+        match matrix.get(i) {
+            Some(row) => a[i][..count].copy_from_slice(row),
+            None => a[i][i] = 1.0,
+        }
+    }
+    for j in 0..padded {
+        for i in j + 1..padded {
+            let value = a[i][j] / a[j][j];
+            for c in j + 1..=i {
+                a[i][c] -= value * a[c][j];
+            }
+        }
+        let pivot = a[j][j];
+        a[j + 1..].iter_mut().for_each(|row| row[j] /= pivot);
+    }
     let mut factor = DenseFactor {
         offsets: vec![0],
         rows: vec![],
-        values: vec![],
-        inverse_pivots: vec![],
+        tiles: vec![],
+        inverse_diagonals: vec![],
     };
-    for j in 0..count {
-        let pivot = a[j][j];
-        factor.inverse_pivots.push((1.0 / pivot) as f32);
-        for i in j + 1..count {
-            let value = a[i][j] / pivot;
-            if value != 0.0 {
-                factor.rows.push(i as u32);
-                factor.values.push(value as f32);
-                for c in j + 1..count {
-                    a[i][c] -= value * a[j][c];
-                }
+    for first in (0..padded).step_by(BLOCK) {
+        let unit = Matrix4::from_fn(|i, j| match i.cmp(&j) {
+            Ordering::Less => 0.0,
+            Ordering::Equal => 1.0,
+            Ordering::Greater => a[first + i][first + j],
+        });
+        let inverse = unit.inverse();
+        factor.inverse_diagonals.push(core::array::from_fn(|n| {
+            let (i, j) = (n / BLOCK, n % BLOCK);
+            if first + i.max(j) >= count {
+                return 0.0;
+            }
+            let terms = (0..BLOCK).map(|k| inverse.0[k][i] * inverse.0[k][j] / a[first + k][first + k]);
+            terms.sum::<f64>() as f32
+        }));
+        for row in (first + BLOCK..padded).step_by(BLOCK) {
+            let tile: [f32; 16] = core::array::from_fn(|n| {
+                let terms = (0..BLOCK).map(|k| a[row + n / BLOCK][first + k] * inverse.0[k][n % BLOCK]);
+                terms.sum::<f64>() as f32
+            });
+            if tile != [0.0; 16] {
+                factor.rows.push((row / BLOCK) as u32);
+                factor.tiles.push(tile);
             }
         }
         factor.offsets.push(factor.rows.len() as u32);
     }
     factor
+}
+
+/// Unit lower triangular.
+struct Matrix4([[f64; BLOCK]; BLOCK]);
+
+impl Matrix4 {
+    fn from_fn(entry: impl Fn(usize, usize) -> f64) -> Self {
+        Self(core::array::from_fn(|i| core::array::from_fn(|j| entry(i, j))))
+    }
+
+    /// By forward substitution of the identity.
+    fn inverse(&self) -> Self {
+        let mut inverse = Self::from_fn(|i, j| f64::from(i == j));
+        for i in 0..BLOCK {
+            for k in 0..i {
+                for j in 0..BLOCK {
+                    inverse.0[i][j] -= self.0[i][k] * inverse.0[k][j];
+                }
+            }
+        }
+        inverse
+    }
 }
 
 /// A baked package in memory, and what went into it.
@@ -229,10 +281,10 @@ impl Package {
                 ring_offsets: &grid.offsets,
                 ring: &grid.ring,
                 ring_weights: &grid.weights,
-                factor_offsets: &factor.offsets,
-                factor_rows: &factor.rows,
-                factor_values: &factor.values,
-                inverse_pivots: &factor.inverse_pivots,
+                tile_offsets: &factor.offsets,
+                tile_rows: &factor.rows,
+                tiles: &factor.tiles,
+                inverse_diagonals: &factor.inverse_diagonals,
                 support_offsets: &support_offsets,
                 support: &support,
                 entry_offsets: &entry_offsets,

@@ -1,16 +1,17 @@
 //! Frame: the steps in order, from controls to positions and normals. What has not changed is not computed again.
 
-use crate::basis::Basis;
+use crate::basis::{Basis, Fast};
 use crate::blend::{blend, flushed};
 use crate::controls::Controls;
 use crate::decode::decode;
 use crate::error::{Buffer, FrameError};
+use crate::fast::{emit_skinned, map_nodes};
 use crate::normals::check_length;
 use crate::simd::scalar::surface;
 use crate::solve::{emit, solve};
-use crate::workspace::Workspace;
+use crate::workspace::{TierChoice, Workspace};
 
-/// One frame: deforms the rest shape by the controls.
+/// One frame: deforms the rest shape by the controls, on the tier that the workspace was made for.
 #[derive(Debug)]
 pub struct Frame<'j> {
     /// The opened package.
@@ -65,13 +66,20 @@ impl Frame<'_> {
                 .iter_mut()
                 .zip(weights)
                 .for_each(|(to, from)| *to = from);
-            let tier = self.basis.exact();
+            let fast = fast_of(self.basis, workspace);
+            let tier = fast.map_or_else(|| self.basis.exact(), |fast| fast.nodes());
             blend(&tier, workspace.weights, workspace.pre_activations, workspace.features);
             decode(&tier, workspace.features, workspace.gradients);
-            solve(&tier, workspace.gradients, workspace.displacement);
+            solve(workspace.kernels, &tier, workspace.gradients, workspace.displacement);
+            if let Some(fast) = fast {
+                map_nodes(&fast, workspace.gradients, workspace.displacement, workspace.maps);
+            }
             FrameOutcome::Solved
         };
-        let emitted = emit(self.basis, workspace.displacement, self.positions);
+        let emitted = match fast_of(self.basis, workspace) {
+            Some(fast) => emit_skinned(workspace.kernels, &fast, workspace.maps, self.positions),
+            None => emit(self.basis, workspace.displacement, self.positions),
+        };
         if emitted.is_err() {
             workspace.rest();
         }
@@ -79,6 +87,14 @@ impl Frame<'_> {
             surface::normals(self.basis.faces(), self.positions, normals);
         }
         emitted.map(|()| outcome)
+    }
+}
+
+/// The fast tier, where the workspace plays it.
+fn fast_of<'a>(basis: &Basis<'a>, workspace: &Workspace<'_>) -> Option<Fast<'a>> {
+    match workspace.tier() {
+        TierChoice::Exact => None,
+        TierChoice::Fast => basis.fast(),
     }
 }
 

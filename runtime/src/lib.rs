@@ -3,7 +3,8 @@
 //!
 //! Path of data, a frame: [`Controls`] -> blend (sparse folded components, tanh) -> decode (deformation gradients) ->
 //! solve (right-hand side, `L d = b`) -> positions -> [`Normals`]. [`Frame`] runs it; [`Tangent`] is its derivative along
-//! one control; [`Reconstruct`] enters it behind the network, with features of one's own.
+//! one control; [`Reconstruct`] enters it behind the network, with features of one's own. A workspace of the fast tier
+//! ([`TierChoice`]) runs the same path on a few nodes and skins the vertices to them: for crowds and small devices.
 //!
 //! ```no_run
 //! use sinew_runtime::{Basis, Controls, Frame, Workspace, WorkspaceLayout};
@@ -31,6 +32,7 @@ mod blend;
 mod controls;
 mod decode;
 mod error;
+mod fast;
 mod frame;
 pub mod input;
 mod linearize;
@@ -52,5 +54,5 @@ pub use normals::Normals;
 pub use reconstruct::Reconstruct;
 pub use simd::Kernels;
 pub use simd::scalar::surface::FALLBACK_NORMAL;
-pub use sinew_formats::package::{FEATURE_COUNT, OpenError};
-pub use workspace::{Workspace, WorkspaceLayout};
+pub use sinew_formats::package::{FEATURE_COUNT, FastError, OpenError};
+pub use workspace::{TierChoice, Workspace, WorkspaceLayout};

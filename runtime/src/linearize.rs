@@ -1,8 +1,6 @@
 //! Linearize: how the positions move when one weight does, exactly, at the workspace's pose. For fitting weights to
 //! positions by Gauss-Newton, offline and on dragged vertices.
 
-use sinew_formats::package::FEATURE_COUNT;
-
 use crate::basis::Basis;
 use crate::blend::blend_block;
 use crate::error::{Buffer, FrameError};
@@ -31,9 +29,9 @@ impl Tangent<'_> {
     /// Checks identity, length and index, O(1).
     ///
     /// # Errors
-    /// [`FrameError::ForeignWorkspace`], [`FrameError::WrongLength`], [`FrameError::NoSuchComponent`].
+    /// [`FrameError::ForeignWorkspace`], [`FrameError::NeedsExactTier`], [`FrameError::WrongLength`], [`FrameError::NoSuchComponent`].
     pub fn validate(&self, workspace: &Workspace<'_>) -> Result<(), FrameError> {
-        workspace.validate(self.basis)?;
+        workspace.validate_exact(self.basis)?;
         check_length(self.basis, Buffer::Displacement, self.displacement.len())?;
         let (component, component_count) = (self.component, self.basis.component_count());
         if component < component_count {
@@ -53,6 +51,7 @@ impl Tangent<'_> {
     pub fn run(self, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
         self.validate(workspace)?;
         let Workspace {
+            kernels,
             weights,
             features,
             pre_activations,
@@ -67,19 +66,19 @@ impl Tangent<'_> {
         let pre = blend_block(&tier, b, weights, pre_activations);
         let support = tier.support(b);
         let entries = tier.entries(self.component);
-        gradients.fill([0.0; FEATURE_COUNT]);
+        gradients.fill([[0.0; 4]; 3]);
         for (&slot, value) in entries.slots.iter().zip(entries.values) {
             let v = support[slot as usize] as usize;
             let dx = activate_tangent(&bias, &pre[slot as usize], value, entries.scale);
             gradients[v] = gradient_tangent(tier.scales(), &features[v], &dx);
         }
-        solve(&tier, gradients, solution);
+        solve(*kernels, &tier, gradients, solution);
         for (d, &v) in solution.iter().zip(self.basis.vertex_from_solver()) {
             if !d.iter().all(|x| x.is_finite()) {
                 self.displacement.fill([0.0; 3]);
                 return Err(FrameError::NotFinite { vertex: v as usize });
             }
-            self.displacement[v as usize] = *d;
+            self.displacement[v as usize] = [d[0], d[1], d[2]];
         }
         Ok(())
     }

@@ -26,9 +26,9 @@ impl Reconstruct<'_> {
     /// Checks identity, lengths and numbers, O(V): the features come from outside.
     ///
     /// # Errors
-    /// [`FrameError::ForeignWorkspace`], [`FrameError::WrongLength`], [`FrameError::FeatureNotFinite`].
+    /// [`FrameError::ForeignWorkspace`], [`FrameError::NeedsExactTier`], [`FrameError::WrongLength`], [`FrameError::FeatureNotFinite`].
     pub fn validate(&self, workspace: &Workspace<'_>) -> Result<(), FrameError> {
-        workspace.validate(self.basis)?;
+        workspace.validate_exact(self.basis)?;
         check_length(self.basis, Buffer::Features, self.features.len())?;
         check_length(self.basis, Buffer::Positions, self.positions.len())?;
         match self.features.iter().position(|x| !x.iter().all(|c| c.is_finite())) {
@@ -44,14 +44,17 @@ impl Reconstruct<'_> {
     pub fn run(self, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
         self.validate(workspace)?;
         let Workspace {
-            gradients, solution, ..
+            kernels,
+            gradients,
+            solution,
+            ..
         } = workspace;
         let tier = self.basis.exact();
         for (v, x) in self.features.iter().enumerate() {
             let s = self.basis.solver_from_vertex()[v] as usize;
             decode(&tier, core::slice::from_ref(x), &mut gradients[s..=s]);
         }
-        solve(&tier, gradients, solution);
+        solve(*kernels, &tier, gradients, solution);
         emit(self.basis, solution, self.positions)
     }
 }

@@ -4,12 +4,25 @@
 
 use sinew_formats::package::FEATURE_COUNT;
 
-use crate::basis::Basis;
+use crate::basis::{Basis, Tier};
 use crate::error::{FrameError, WorkspaceError};
 use crate::simd::Kernels;
+use crate::simd::scalar::poisson::{BLOCK, Gradient, Lane};
+use crate::simd::scalar::skin::Map;
 
 /// Start of every buffer: a cache line, and the widest vector register.
 const ALIGNMENT: usize = 64;
+
+/// Which tier of a package a workspace plays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+pub enum TierChoice {
+    /// All vertices are solved for: what was trained.
+    #[default]
+    Exact,
+    /// A few nodes are solved for, and the vertices follow them: for crowds and small devices. How far it is from the exact
+    /// tier, [`Basis::fast_error`] says.
+    Fast,
+}
 
 /// How much memory a workspace needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,13 +34,18 @@ pub struct WorkspaceLayout {
 }
 
 impl WorkspaceLayout {
-    /// Layout for `basis`: about 132 bytes a vertex.
+    /// Layout for the exact tier of `basis`: about 152 bytes a vertex.
     pub fn for_basis(basis: &Basis<'_>) -> Self {
-        let sections = Sections::of(basis);
-        Self {
-            size_bytes: sections.size_bytes(),
-            alignment: ALIGNMENT,
-        }
+        Sections::exact(basis).layout()
+    }
+
+    /// Layout for a tier of `basis`: the fast one takes about 200 bytes a node, which is 25 a vertex with a node for every
+    /// eight.
+    ///
+    /// # Errors
+    /// [`WorkspaceError::NoFastTier`].
+    pub fn for_tier(basis: &Basis<'_>, tier: TierChoice) -> Result<Self, WorkspaceError> {
+        Ok(Sections::of(basis, tier)?.layout())
     }
 
     /// Bytes that are enough wherever the memory starts.
@@ -41,25 +59,66 @@ struct Sections {
     components: usize,
     nodes: usize,
     largest_support: usize,
+    /// Nodes of the solve that is not the pose's: none in the fast tier.
+    solved_aside: usize,
+    /// Nodes that vertices follow: none in the exact tier.
+    maps: usize,
 }
 
 impl Sections {
-    fn of(basis: &Basis<'_>) -> Self {
+    fn exact(basis: &Basis<'_>) -> Self {
         let tier = basis.exact();
+        Self {
+            solved_aside: tier.node_count(),
+            maps: 0,
+            ..Self::shared(basis, &tier)
+        }
+    }
+
+    fn of(basis: &Basis<'_>, tier: TierChoice) -> Result<Self, WorkspaceError> {
+        if tier == TierChoice::Exact {
+            return Ok(Self::exact(basis));
+        }
+        let nodes = basis.fast().ok_or(WorkspaceError::NoFastTier)?.nodes();
+        Ok(Self {
+            solved_aside: 0,
+            maps: nodes.node_count(),
+            ..Self::shared(basis, &nodes)
+        })
+    }
+
+    fn shared(basis: &Basis<'_>, tier: &Tier<'_>) -> Self {
         let supports = (0..tier.block_count()).map(|b| tier.support(b).len());
         Self {
             components: basis.component_count(),
             nodes: tier.node_count(),
             largest_support: supports.max().unwrap_or(0),
+            solved_aside: 0,
+            maps: 0,
         }
+    }
+
+    fn layout(&self) -> WorkspaceLayout {
+        WorkspaceLayout {
+            size_bytes: self.size_bytes(),
+            alignment: ALIGNMENT,
+        }
+    }
+
+    /// Nodes of whole blocks: the solve runs on tiles.
+    fn padded_nodes(&self) -> usize {
+        self.nodes.next_multiple_of(BLOCK)
     }
 
     /// The limits of the format keep this under a gigabyte, which fits 32 bits.
     fn size_bytes(&self) -> usize {
         section_bytes::<f32>(self.components)
-            + 2 * section_bytes::<[f32; FEATURE_COUNT]>(self.nodes)
+            + section_bytes::<[f32; FEATURE_COUNT]>(self.nodes)
             + section_bytes::<[f32; FEATURE_COUNT]>(self.largest_support)
-            + 2 * section_bytes::<[f32; 3]>(self.nodes)
+            + section_bytes::<Gradient>(self.nodes)
+            + section_bytes::<Lane>(self.padded_nodes())
+            + section_bytes::<Lane>(self.solved_aside.next_multiple_of(BLOCK))
+            + section_bytes::<Map>(self.maps)
     }
 }
 
@@ -72,20 +131,24 @@ fn section_bytes<T>(count: usize) -> usize {
 #[derive(Debug)]
 pub struct Workspace<'w> {
     basis_id: [u8; 16],
+    /// What the buffers are for; the basis has it.
+    pub(crate) tier: TierChoice,
     /// What the frame path runs on; present on this machine.
     pub(crate) kernels: Kernels,
     /// Weights of the pose, tiny ones flushed. Shape: `[K]`.
     pub(crate) weights: &'w mut [f32],
-    /// Features of the pose, network units. Shape: `[V]`, solver order.
+    /// Features of the pose, network units. Shape: `[N]`, solver order.
     pub(crate) features: &'w mut [[f32; FEATURE_COUNT]],
-    /// Displacement of the pose. Shape: `[V]`, solver order.
-    pub(crate) displacement: &'w mut [[f32; 3]],
+    /// Displacement of the pose, zero after the last node. Shape: `[4 T]`, solver order.
+    pub(crate) displacement: &'w mut [Lane],
     /// Scratch: a block's blend. Shape: `[largest support]`.
     pub(crate) pre_activations: &'w mut [[f32; FEATURE_COUNT]],
-    /// Scratch: `D = T - I` or its derivative. Shape: `[V]`, solver order.
-    pub(crate) gradients: &'w mut [[f32; FEATURE_COUNT]],
-    /// Scratch: a solve that is not the pose's. Shape: `[V]`, solver order.
-    pub(crate) solution: &'w mut [[f32; 3]],
+    /// Scratch: `D = T - I` or its derivative. Shape: `[N]`, solver order.
+    pub(crate) gradients: &'w mut [Gradient],
+    /// Scratch: a solve that is not the pose's. Shape: that of `displacement`; empty in the fast tier.
+    pub(crate) solution: &'w mut [Lane],
+    /// Maps of the pose. Shape: `[N]`, solver order; empty in the exact tier.
+    pub(crate) maps: &'w mut [Map],
 }
 
 impl<'w> Workspace<'w> {
@@ -103,10 +166,23 @@ impl<'w> Workspace<'w> {
     /// # Errors
     /// Those of [`Workspace::new`]; [`WorkspaceError::KernelsMissing`] where the processor lacks the instructions.
     pub fn with_kernels(basis: &Basis<'_>, memory: &'w mut [u8], kernels: Kernels) -> Result<Self, WorkspaceError> {
+        Self::for_tier(basis, TierChoice::Exact, memory, kernels)
+    }
+
+    /// The same for a tier of choice; [`WorkspaceLayout::for_tier`] says how much memory.
+    ///
+    /// # Errors
+    /// Those of [`Workspace::with_kernels`]; [`WorkspaceError::NoFastTier`].
+    pub fn for_tier(
+        basis: &Basis<'_>,
+        tier: TierChoice,
+        memory: &'w mut [u8],
+        kernels: Kernels,
+    ) -> Result<Self, WorkspaceError> {
         if !kernels.run_here() {
             return Err(WorkspaceError::KernelsMissing { kernels });
         }
-        let sections = Sections::of(basis);
+        let sections = Sections::of(basis, tier)?;
         let skipped = memory.as_ptr().align_offset(ALIGNMENT);
         let required_bytes = skipped.saturating_add(sections.size_bytes());
         if memory.len() < required_bytes {
@@ -119,13 +195,15 @@ impl<'w> Workspace<'w> {
         memory.fill(0);
         let (weights, memory) = carve(memory, sections.components);
         let (features, memory) = carve(memory, sections.nodes);
-        let (displacement, memory) = carve(memory, sections.nodes);
+        let (displacement, memory) = carve(memory, sections.padded_nodes());
         let (pre_activations, memory) = carve(memory, sections.largest_support);
         let (gradients, memory) = carve(memory, sections.nodes);
-        let (solution, _) = carve(memory, sections.nodes);
+        let (solution, memory) = carve(memory, sections.solved_aside.next_multiple_of(BLOCK));
+        let (maps, _) = carve(memory, sections.maps);
         let basis_id = basis.id();
         Ok(Self {
             basis_id,
+            tier,
             kernels,
             weights,
             features,
@@ -133,10 +211,12 @@ impl<'w> Workspace<'w> {
             pre_activations,
             gradients,
             solution,
+            maps,
         })
     }
 
-    /// Features of the pose, in network units. Shape: `[V]`, **solver** order; zero where no component reaches.
+    /// Features of the pose, in network units; zero where no component reaches. Shape: `[V]`, **solver** order; in the fast
+    /// tier `[N]`, those of its nodes.
     pub fn features(&self) -> &[[f32; FEATURE_COUNT]] {
         self.features
     }
@@ -144,6 +224,11 @@ impl<'w> Workspace<'w> {
     /// Weights of the pose; those under 1e-6 count as zero. Shape: `[K]`.
     pub fn weights(&self) -> &[f32] {
         self.weights
+    }
+
+    /// What frames on this workspace play.
+    pub fn tier(&self) -> TierChoice {
+        self.tier
     }
 
     /// What frames on this workspace run on.
@@ -155,7 +240,17 @@ impl<'w> Workspace<'w> {
     pub(crate) fn rest(&mut self) {
         self.weights.fill(0.0);
         self.features.fill([0.0; FEATURE_COUNT]);
-        self.displacement.fill([0.0; 3]);
+        self.displacement.fill([0.0; 4]);
+        self.maps.fill([[0.0; 4]; 4]);
+    }
+
+    /// Refuses another basis, and the fast tier.
+    pub(crate) fn validate_exact(&self, basis: &Basis<'_>) -> Result<(), FrameError> {
+        self.validate(basis)?;
+        match self.tier {
+            TierChoice::Exact => Ok(()),
+            TierChoice::Fast => Err(FrameError::NeedsExactTier),
+        }
     }
 
     /// Refuses a basis other than the one this workspace was made for.
@@ -243,7 +338,7 @@ mod tests {
         let package = Package::small(1);
         let basis = open(&package);
         let layout = WorkspaceLayout::for_basis(&basis);
-        let exact = 4 * basis.component_count() + 132 * basis.vertex_count();
+        let exact = 4 * basis.component_count() + 152 * basis.vertex_count();
         assert!(
             layout.size_bytes <= exact + 6 * layout.alignment,
             "{} {exact}",

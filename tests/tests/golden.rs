@@ -81,10 +81,10 @@ fn describe_tier(tier: &TierView<'_>, line: &mut dyn FnMut(&str, &dyn Debug)) {
     line("ring_offsets", &tier.ring_offsets());
     line("ring", &tier.ring());
     line("ring_weights", &tier.ring_weights());
-    line("factor_offsets", &tier.factor_offsets());
-    line("factor_rows", &tier.factor_rows());
-    line("factor_values", &tier.factor_values());
-    line("inverse_pivots", &tier.inverse_pivots());
+    line("tile_offsets", &tier.tile_offsets());
+    line("tile_rows", &tier.tile_rows());
+    line("tiles", &tier.tiles());
+    line("inverse_diagonals", &tier.inverse_diagonals());
     line("support_offsets", &tier.support_offsets());
     line("support", &tier.support());
     line("entry_offsets", &tier.entry_offsets());

@@ -4,9 +4,51 @@
 //! Vertices carry two numbers: the source order (`vertex`) and the elimination order of the factor (`solver`). Decode,
 //! right-hand side and solve run in solver order; positions, normals and faces keep source order.
 
-use rkyv::{Archive, Serialize, with::InlineAsBox};
+use rkyv::{
+    Archive, ArchiveUnsized, Place, Serialize, SerializeUnsized,
+    boxed::{ArchivedBox, BoxResolver},
+    rancor::Fallible,
+    ser::{Writer, WriterExt},
+    with::{ArchiveWith, InlineAsBox, SerializeWith},
+};
 
 use super::FEATURE_COUNT;
+
+/// Nodes of a block, and rows and columns of a tile.
+pub const TILE_SIDE: usize = 4;
+/// Numbers of a tile.
+pub const TILE_ENTRIES: usize = TILE_SIDE * TILE_SIDE;
+
+/// Archives a slice as [`InlineAsBox`] does, but starts it at a multiple of 64 bytes from the start of the file: a tile
+/// is a cache line where the package starts on one.
+#[derive(Debug)]
+pub struct OnCacheLines;
+
+const CACHE_LINE_BYTES: usize = 64;
+
+impl<T> ArchiveWith<&[T]> for OnCacheLines
+where
+    [T]: ArchiveUnsized,
+{
+    type Archived = ArchivedBox<<[T] as ArchiveUnsized>::Archived>;
+    type Resolver = BoxResolver;
+
+    fn resolve_with(field: &&[T], resolver: Self::Resolver, out: Place<Self::Archived>) {
+        ArchivedBox::resolve_from_ref(*field, resolver, out);
+    }
+}
+
+impl<T, S: Fallible + Writer + ?Sized> SerializeWith<&[T], S> for OnCacheLines
+where
+    [T]: SerializeUnsized<S>,
+{
+    fn serialize_with(field: &&[T], serializer: &mut S) -> Result<Self::Resolver, S::Error> {
+        // In two steps: rkyv pads by at most 32 bytes at once.
+        serializer.align(CACHE_LINE_BYTES / 2)?;
+        serializer.align(CACHE_LINE_BYTES)?;
+        ArchivedBox::serialize_from_ref(*field, serializer)
+    }
+}
 
 /// The frame path's data: V vertices, F faces, B blocks, K components.
 #[derive(Archive, Serialize, Debug)]
@@ -103,18 +145,19 @@ pub struct BakedTier<'a> {
     /// Half the cotangent sum of each edge, symmetric, non-negative in the exact tier. Shape: that of `ring`.
     #[rkyv(with = InlineAsBox)]
     pub ring_weights: &'a [f32],
-    /// Columns of the unit lower factor of `L + anchor = F D F^T`, below the diagonal. Shape: `[N + 1]`.
+    /// `L + anchor = F D F^T` in tiles of 4 x 4 over T = ceil(N / 4) blocks of solver indices: F is block unit lower
+    /// triangular, D block diagonal. Columns over `tile_rows`. Shape: `[T + 1]`, starts at 0, never falls.
     #[rkyv(with = InlineAsBox)]
-    pub factor_offsets: &'a [u32],
-    /// Row (solver index) of each entry, ascending within a column, greater than the column.
+    pub tile_offsets: &'a [u32],
+    /// Block of rows of each tile, ascending within a column, greater than the column.
     #[rkyv(with = InlineAsBox)]
-    pub factor_rows: &'a [u32],
-    /// Entries of F. Shape: that of `factor_rows`.
-    #[rkyv(with = InlineAsBox)]
-    pub factor_values: &'a [f32],
-    /// `1 / D`, positive. Shape: `[N]`.
-    #[rkyv(with = InlineAsBox)]
-    pub inverse_pivots: &'a [f32],
+    pub tile_rows: &'a [u32],
+    /// Tiles of F below its diagonal, row-major. Shape: that of `tile_rows`. Starts at a multiple of 64 bytes in the file.
+    #[rkyv(with = OnCacheLines)]
+    pub tiles: &'a [[f32; TILE_ENTRIES]],
+    /// `1 / D`: symmetric, row-major, zero where the last block has no node. Shape: `[T]`. Starts as `tiles` does.
+    #[rkyv(with = OnCacheLines)]
+    pub inverse_diagonals: &'a [[f32; TILE_ENTRIES]],
     /// Compressed rows over `support`, one a block. Shape: `[B + 1]`, starts at 0, never falls.
     #[rkyv(with = InlineAsBox)]
     pub support_offsets: &'a [u32],

@@ -4,7 +4,7 @@ use rkyv::{api::low::access, rancor::Failure};
 
 use super::{
     ArchivedBakedBasis, ArchivedBakedFast, ArchivedBakedTier, BakedBlock, BakedComponent, FEATURE_COUNT, FastError, Header,
-    OpenError, PackageKind, SKIN_NODES,
+    OpenError, PackageKind, SKIN_NODES, TILE_ENTRIES, TILE_SIDE,
     open::{native, payload},
     rules,
 };
@@ -213,24 +213,29 @@ impl<'a> TierView<'a> {
         native(&self.archived.ring_weights)
     }
 
-    /// Shape: `[N + 1]`, from 0 to `factor_rows().len()`, never falls.
-    pub fn factor_offsets(&self) -> &'a [u32] {
-        native(&self.archived.factor_offsets)
+    /// T, the blocks of four nodes that the factor's tiles stand on; the last one may be short.
+    pub fn tile_column_count(&self) -> usize {
+        self.node_count().div_ceil(TILE_SIDE)
     }
 
-    /// Solver indices < N, ascending within a column, greater than the column.
-    pub fn factor_rows(&self) -> &'a [u32] {
-        native(&self.archived.factor_rows)
+    /// Shape: `[T + 1]`, from 0 to `tile_rows().len()`, never falls.
+    pub fn tile_offsets(&self) -> &'a [u32] {
+        native(&self.archived.tile_offsets)
     }
 
-    /// Shape: that of `factor_rows`; finite.
-    pub fn factor_values(&self) -> &'a [f32] {
-        native(&self.archived.factor_values)
+    /// Blocks < T, ascending within a column, greater than the column.
+    pub fn tile_rows(&self) -> &'a [u32] {
+        native(&self.archived.tile_rows)
     }
 
-    /// Shape: `[N]`; finite, positive.
-    pub fn inverse_pivots(&self) -> &'a [f32] {
-        native(&self.archived.inverse_pivots)
+    /// Shape: that of `tile_rows`; finite.
+    pub fn tiles(&self) -> &'a [[f32; TILE_ENTRIES]] {
+        native(&self.archived.tiles)
+    }
+
+    /// Shape: `[T]`; finite, positive on the diagonal of every node.
+    pub fn inverse_diagonals(&self) -> &'a [[f32; TILE_ENTRIES]] {
+        native(&self.archived.inverse_diagonals)
     }
 
     /// Shape: `[B + 1]`, from 0 to `support().len()`, never falls.

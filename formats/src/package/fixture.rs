@@ -10,7 +10,8 @@ use half::f16;
 
 use super::{
     BakedBasis, BakedBlock, BakedComponent, BakedFast, BakedTier, BlockRecord, CompactBasis, ComponentRecord,
-    FEATURE_COUNT, FastError, GraphConvRecord, Header, NONE, PackageKind, Provenance, Quality, SKIN_NODES, write_compact,
+    FEATURE_COUNT, FastError, GraphConvRecord, Header, NONE, PackageKind, Provenance, Quality, SKIN_NODES, TILE_ENTRIES,
+    TILE_SIDE, write_compact,
 };
 
 /// V of the grid.
@@ -76,10 +77,10 @@ pub struct TinyTier {
     pub ring_offsets: Vec<u32>,
     pub ring: Vec<u32>,
     pub ring_weights: Vec<f32>,
-    pub factor_offsets: Vec<u32>,
-    pub factor_rows: Vec<u32>,
-    pub factor_values: Vec<f32>,
-    pub inverse_pivots: Vec<f32>,
+    pub tile_offsets: Vec<u32>,
+    pub tile_rows: Vec<u32>,
+    pub tiles: Vec<[f32; TILE_ENTRIES]>,
+    pub inverse_diagonals: Vec<[f32; TILE_ENTRIES]>,
     pub support_offsets: Vec<u32>,
     pub support: Vec<u32>,
     pub entry_offsets: Vec<u32>,
@@ -169,10 +170,10 @@ impl TinyTier {
             ring_offsets: &self.ring_offsets,
             ring: &self.ring,
             ring_weights: &self.ring_weights,
-            factor_offsets: &self.factor_offsets,
-            factor_rows: &self.factor_rows,
-            factor_values: &self.factor_values,
-            inverse_pivots: &self.inverse_pivots,
+            tile_offsets: &self.tile_offsets,
+            tile_rows: &self.tile_rows,
+            tiles: &self.tiles,
+            inverse_diagonals: &self.inverse_diagonals,
             support_offsets: &self.support_offsets,
             support: &self.support,
             entry_offsets: &self.entry_offsets,
@@ -305,9 +306,11 @@ fn baked_component(component: &ComponentRecord<'static>) -> BakedComponent<'stat
     }
 }
 
-/// The Laplacian, with 1 added at the anchor (solver index), to `F D F^T`, dense.
+/// The Laplacian, with 1 added at the anchor (solver index), to `F D F^T` by blocks, dense.
 fn factorize(tier: &mut TinyTier, anchor: usize) {
-    let mut lower = [[0.0_f64; VERTEX_COUNT]; VERTEX_COUNT];
+    const BLOCK_COUNT: usize = VERTEX_COUNT.div_ceil(TILE_SIDE);
+    // Where the last block has no node it has a node of its own, so that it can be inverted.
+    let mut lower = [[0.0_f64; BLOCK_COUNT * TILE_SIDE]; BLOCK_COUNT * TILE_SIDE];
     for row in 0..VERTEX_COUNT {
         for entry in tier.ring_offsets[row] as usize..tier.ring_offsets[row + 1] as usize {
             let weight = f64::from(tier.ring_weights[entry]);
@@ -316,22 +319,59 @@ fn factorize(tier: &mut TinyTier, anchor: usize) {
         }
     }
     lower[anchor][anchor] += 1.0;
-    tier.factor_offsets.push(0);
-    for column in 0..VERTEX_COUNT {
-        let pivot = lower[column][column];
-        tier.inverse_pivots.push((1.0 / pivot) as f32);
-        for row in column + 1..VERTEX_COUNT {
-            let value = lower[row][column] / pivot;
-            for other in column + 1..VERTEX_COUNT {
-                lower[row][other] -= value * lower[column][other];
+    for (row, entries) in lower.iter_mut().enumerate().skip(VERTEX_COUNT) {
+        entries[row] = 1.0;
+    }
+    tier.tile_offsets.push(0);
+    for column in 0..BLOCK_COUNT {
+        let own = column * TILE_SIDE..(column + 1) * TILE_SIDE;
+        let inverse = inverse(core::array::from_fn(|r| {
+            core::array::from_fn(|c| lower[own.start + r][own.start + c])
+        }));
+        tier.inverse_diagonals.push(core::array::from_fn(|n| {
+            let (r, c) = (n / TILE_SIDE, n % TILE_SIDE);
+            let is_node = own.start + r.max(c) < VERTEX_COUNT;
+            if is_node { inverse[r][c] as f32 } else { 0.0 }
+        }));
+        let rest = own.end..BLOCK_COUNT * TILE_SIDE;
+        let before = lower;
+        for row in rest.clone() {
+            for c in 0..TILE_SIDE {
+                lower[row][own.start + c] = (0..TILE_SIDE).map(|n| before[row][own.start + n] * inverse[n][c]).sum();
             }
-            if value != 0.0 {
-                tier.factor_rows.push(row as u32);
-                tier.factor_values.push(value as f32);
+            for other in rest.clone() {
+                let update = own.clone().map(|n| lower[row][n] * before[other][n]);
+                lower[row][other] -= update.sum::<f64>();
             }
         }
-        tier.factor_offsets.push(tier.factor_rows.len() as u32);
+        for row in column + 1..BLOCK_COUNT {
+            let tile: [f32; TILE_ENTRIES] =
+                core::array::from_fn(|n| lower[row * TILE_SIDE + n / TILE_SIDE][own.start + n % TILE_SIDE] as f32);
+            if tile != [0.0; TILE_ENTRIES] {
+                tier.tile_rows.push(row as u32);
+                tier.tiles.push(tile);
+            }
+        }
+        tier.tile_offsets.push(tier.tile_rows.len() as u32);
     }
+}
+
+/// Gauss and Jordan's, of a positive definite matrix.
+fn inverse(mut matrix: [[f64; TILE_SIDE]; TILE_SIDE]) -> [[f64; TILE_SIDE]; TILE_SIDE] {
+    for n in 0..TILE_SIDE {
+        let pivot = matrix[n][n];
+        matrix[n][n] = 1.0;
+        matrix[n] = matrix[n].map(|value| value / pivot);
+        let row = matrix[n];
+        for other in (0..TILE_SIDE).filter(|&other| other != n) {
+            let share = matrix[other][n];
+            matrix[other][n] = 0.0;
+            for c in 0..TILE_SIDE {
+                matrix[other][c] -= share * row[c];
+            }
+        }
+    }
+    matrix
 }
 
 /// Multiplies the components by the decoders: `point C_k + neighbour mean C_k`, on supports grown by a ring.

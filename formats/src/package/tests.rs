@@ -50,10 +50,10 @@ fn tier_is_read_as_written(view: &TierView<'_>, tiny: &TinyTier) {
     assert_eq!(view.ring_offsets(), tiny.ring_offsets);
     assert_eq!(view.ring(), tiny.ring);
     assert_eq!(view.ring_weights(), tiny.ring_weights);
-    assert_eq!(view.factor_offsets(), tiny.factor_offsets);
-    assert_eq!(view.factor_rows(), tiny.factor_rows);
-    assert_eq!(view.factor_values(), tiny.factor_values);
-    assert_eq!(view.inverse_pivots(), tiny.inverse_pivots);
+    assert_eq!(view.tile_offsets(), tiny.tile_offsets);
+    assert_eq!(view.tile_rows(), tiny.tile_rows);
+    assert_eq!(view.tiles(), tiny.tiles);
+    assert_eq!(view.inverse_diagonals(), tiny.inverse_diagonals);
     assert_eq!(view.support_offsets(), tiny.support_offsets);
     assert_eq!(view.support(), tiny.support);
     assert_eq!(view.entry_offsets(), tiny.entry_offsets);
@@ -62,11 +62,20 @@ fn tier_is_read_as_written(view: &TierView<'_>, tiny: &TinyTier) {
 }
 
 #[test]
+fn tiles_lie_on_cache_lines_of_the_file() {
+    let bytes = write_baked(&tiny_baked().basis()).unwrap();
+    let exact = BakedView::open(&bytes).unwrap().exact();
+    for tiles in [exact.tiles(), exact.inverse_diagonals()] {
+        assert_eq!((tiles.as_ptr().addr() - bytes.as_ptr().addr()) % 64, 0);
+    }
+}
+
+#[test]
 fn a_second_tier_is_read_as_written() {
     let mut tiny = tiny_baked();
     let mut fast = tiny.own_nodes();
     fast.nodes.rest_positions[0][0] = -0.5;
-    fast.nodes.inverse_pivots[3] = 0.25;
+    fast.nodes.tiles[1][3] = 0.25;
     for weight in &mut fast.nodes.ring_weights {
         *weight = -*weight;
     }
@@ -229,10 +238,10 @@ fn records_lie_as_documented() {
         ring_offsets,
         ring,
         ring_weights,
-        factor_offsets,
-        factor_rows,
-        factor_values,
-        inverse_pivots,
+        tile_offsets,
+        tile_rows,
+        tiles,
+        inverse_diagonals,
         support_offsets,
         support,
         entry_offsets,

@@ -212,7 +212,7 @@ fn print_baked(out: &mut String, view: &BakedView<'_>, byte_count: usize, as_jso
         let summary = json!({
             "kind": "baked", "content_id": hex(view.content_id()), "compact_id": hex(view.compact_id()), "bytes": byte_count,
             "vertices": view.vertex_count(), "faces": view.faces().len(), "blocks": view.block_count(),
-            "factor_entries": exact.factor_rows().len(), "components": components,
+            "factor_tiles": exact.tiles().len(), "components": components,
         });
         let _ = writeln!(out, "{summary:#}");
         return;
@@ -225,10 +225,10 @@ fn print_baked(out: &mut String, view: &BakedView<'_>, byte_count: usize, as_jso
     );
     let _ = writeln!(
         out,
-        "  {:.2} MB: factor {:.2} ({} entries), components {:.2}",
+        "  {:.2} MB: factor {:.2} ({} tiles), components {:.2}",
         byte_count as f64 / 1e6,
-        (exact.factor_rows().len() * 8) as f64 / 1e6,
-        exact.factor_rows().len(),
+        ((exact.tiles().len() + exact.inverse_diagonals().len()) * 64 + exact.tile_rows().len() * 4) as f64 / 1e6,
+        exact.tiles().len(),
         (exact.entry_values().len() * 22) as f64 / 1e6
     );
     let _ = writeln!(

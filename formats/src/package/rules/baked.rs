@@ -2,7 +2,7 @@
 //! errors bear the same names.
 
 use super::{
-    super::{BakedView, FastView, OpenError, SKIN_WEIGHT_SUM, TierView, limits},
+    super::{BakedView, FastView, OpenError, SKIN_WEIGHT_SUM, TILE_ENTRIES, TILE_SIDE, TierView, limits},
     BlockLinks, ascending_below, below, control, count, faces, finite_halves, names, offsets, positions, positive,
     same_count, tree, within,
 };
@@ -147,37 +147,43 @@ fn rings(tier: &TierView<'_>, least_weight: f32) -> Result<(), OpenError> {
 }
 
 fn factor(tier: &TierView<'_>) -> Result<(), OpenError> {
-    let node_count = tier.node_count();
-    let (rows, values) = (tier.factor_rows(), tier.factor_values());
-    count("factor_rows", rows.len(), 0, limits::FACTOR_ENTRIES)?;
-    same_count("factor_values", values.len(), rows.len())?;
-    offsets("factor_offsets", tier.factor_offsets(), node_count, rows.len())?;
-    for (column, range) in tier.factor_offsets().windows(2).enumerate() {
+    let column_count = tier.tile_column_count();
+    let (rows, tiles, inverse_diagonals) = (tier.tile_rows(), tier.tiles(), tier.inverse_diagonals());
+    count("tile_rows", rows.len(), 0, limits::TILES)?;
+    same_count("tiles", tiles.len(), rows.len())?;
+    offsets("tile_offsets", tier.tile_offsets(), column_count, rows.len())?;
+    for (column, range) in tier.tile_offsets().windows(2).enumerate() {
         let start = range[0] as usize;
         let entries = &rows[start..range[1] as usize];
-        ascending_below("factor_rows", start, entries, node_count)?;
+        ascending_below("tile_rows", start, entries, column_count)?;
         if entries.first().is_some_and(|&row| row as usize <= column) {
             return Err(OpenError::NotAscending {
-                field: "factor_rows",
+                field: "tile_rows",
                 index: start,
             });
         }
     }
-    for (entry, &value) in values.iter().enumerate() {
-        within(
-            "factor_values",
-            entry,
-            value,
-            -limits::FACTOR_VALUE,
-            limits::FACTOR_VALUE,
-        )?;
+    matrices("tiles", tiles, limits::FACTOR_VALUE)?;
+    same_count("inverse_diagonals", inverse_diagonals.len(), column_count)?;
+    matrices("inverse_diagonals", inverse_diagonals, limits::INVERSE_PIVOT)?;
+    for node in 0..tier.node_count() {
+        let (column, side) = (node / TILE_SIDE, node % TILE_SIDE);
+        if inverse_diagonals[column][(TILE_SIDE + 1) * side] <= 0.0 {
+            return Err(OpenError::PivotNotPositive { index: node });
+        }
     }
-    same_count("inverse_pivots", tier.inverse_pivots().len(), node_count)?;
-    for (column, &pivot) in tier.inverse_pivots().iter().enumerate() {
-        positive("inverse_pivots", column, pivot, limits::INVERSE_PIVOT).map_err(|error| match error {
-            OpenError::NotPositive { index, .. } => OpenError::PivotNotPositive { index },
-            other => other,
-        })?;
+    Ok(())
+}
+
+/// Every entry is finite and at most `greatest` either way.
+fn matrices(field: &'static str, values: &[[f32; TILE_ENTRIES]], greatest: f32) -> Result<(), OpenError> {
+    for (index, tile) in values.iter().enumerate() {
+        // One comparison an entry, false for what is not a number; the slow way only says which fault it was.
+        if !tile.iter().fold(true, |sound, value| sound & (value.abs() <= greatest)) {
+            for &value in tile {
+                within(field, index, value, -greatest, greatest)?;
+            }
+        }
     }
     Ok(())
 }

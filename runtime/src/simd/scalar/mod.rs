@@ -4,6 +4,7 @@
 pub(crate) mod blend;
 pub(crate) mod gradient;
 pub(crate) mod poisson;
+pub(crate) mod skin;
 pub(crate) mod surface;
 
 #[cfg(test)]

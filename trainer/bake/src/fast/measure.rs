@@ -125,7 +125,7 @@ impl<'a> Measure<'a> {
     }
 
     fn tally(&self, poses: &[Vec<f64>]) -> Tally {
-        let fast = Player::new(self.source.network, &self.fast.nodes);
+        let fast = Player::new(self.source.network, &self.fast.nodes, &self.fast.components);
         let mut sum = Tally::new();
         for poses in poses.chunks(POSES_AT_ONCE) {
             let tallies: Vec<Tally> = poses

@@ -33,6 +33,8 @@ pub const MIXED_SHARE: f64 = 0.25;
 #[derive(Debug)]
 pub struct Fast {
     nodes: Tier,
+    /// At the nodes, in their solver order. Shape: `[K]`.
+    components: Vec<FoldedComponent>,
     centre: [f32; 3],
     rest_positions: Vec<[f32; 3]>,
     skin_nodes: Vec<[u16; SKIN_NODES]>,
@@ -65,7 +67,7 @@ impl Fast {
         let surface = SurfaceGraph::new(&source.surface.topology, &source.surface.rest);
         let node_count = node_count.clamp(1, limits::FAST_NODES);
         let nodes = surface.farthest_points(source.anchor_vertex, node_count);
-        let exact = Player::new(source.network, source.exact);
+        let exact = Player::new(source.network, source.exact, source.components);
         let skin = Skin::fit(source, &surface, &nodes, &exact);
 
         let graph = NodeGraph::new(source.surface, &skin, nodes.len());
@@ -83,6 +85,7 @@ impl Fast {
             rest_positions: source.rest_positions.to_vec(),
             skin_nodes: skin.nodes.iter().map(in_solver_order).collect(),
             skin_weights: skin.weights,
+            components,
             error: FastError {
                 mixed_rms: 0.0,
                 mixed_p99: 0.0,

@@ -4,8 +4,9 @@ use half::f16;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use sinew_formats::package::{BakedBlock, BakedComponent, FEATURE_COUNT};
+use sinew_formats::package::{BakedBlock, BakedComponent, FEATURE_COUNT, TILE_ENTRIES, TILE_SIDE};
 
+use crate::fold::FoldedComponent;
 use crate::tier::Tier;
 
 /// `T - I` of a node, row-major.
@@ -71,25 +72,33 @@ pub struct Pose {
 pub struct Player<'a> {
     network: Network<'a>,
     tier: &'a Tier,
-    /// The entries, widened, with their scales. Shape: that of the tier's.
+    components: Vec<Component>,
+}
+
+/// A component, widened and scaled.
+#[derive(Debug)]
+struct Component {
+    /// Solver indices.
+    nodes: Vec<u32>,
+    /// Shape: that of `nodes`.
     values: Vec<[f64; FEATURE_COUNT]>,
 }
 
 impl<'a> Player<'a> {
-    /// Widens the entries.
-    pub fn new(network: Network<'a>, tier: &'a Tier) -> Self {
-        let offsets = tier.folded.entry_offsets.windows(2);
-        let values = offsets.zip(network.components).flat_map(|(entries, component)| {
+    /// Widens the components, which are those of the tier. Shape: `[K]`, in its solver order.
+    pub fn new(network: Network<'a>, tier: &'a Tier, components: &[FoldedComponent]) -> Self {
+        let widened = components.iter().map(|component| {
             let scale = f64::from(component.value_scale);
-            let values = &tier.folded.entry_values[entries[0] as usize..entries[1] as usize];
-            values
-                .iter()
-                .map(move |halves| halves.map(|bits| scale * f16::from_bits(bits).to_f64()))
+            let values = component.values.iter();
+            Component {
+                nodes: component.solver_indices.clone(),
+                values: values.map(|halves| halves.map(|bits| scale * f16::from_bits(bits).to_f64())).collect(),
+            }
         });
         Self {
             network,
             tier,
-            values: values.collect(),
+            components: widened.collect(),
         }
     }
 
@@ -126,28 +135,28 @@ impl<'a> Player<'a> {
     }
 
     fn features(&self, weights: &[f64]) -> Vec<[f64; FEATURE_COUNT]> {
-        let folded = &self.tier.folded;
-        let mut features = vec![[0.0; FEATURE_COUNT]; self.tier.node_count()];
-        for (b, block) in self.network.blocks.iter().enumerate() {
-            let support = &folded.support[folded.support_offsets[b] as usize..folded.support_offsets[b + 1] as usize];
-            let mut sums = vec![[0.0; FEATURE_COUNT]; support.len()];
+        let nothing = vec![[0.0; FEATURE_COUNT]; self.tier.node_count()];
+        let (mut features, mut sums) = (nothing.clone(), nothing);
+        for block in self.network.blocks {
             let first = block.first_component as usize;
-            for k in first..first + block.component_count as usize {
-                if weights[k] == 0.0 {
-                    continue;
-                }
-                for e in folded.entry_offsets[k] as usize..folded.entry_offsets[k + 1] as usize {
-                    let sum = &mut sums[folded.entry_slots[e] as usize];
+            let active = (first..first + block.component_count as usize).filter(|&k| weights[k] != 0.0);
+            let active: Vec<usize> = active.collect();
+            for &k in &active {
+                for (&node, value) in self.components[k].nodes.iter().zip(&self.components[k].values) {
                     for c in 0..FEATURE_COUNT {
-                        sum[c] += weights[k] * self.values[e][c];
+                        sums[node as usize][c] += weights[k] * value[c];
                     }
                 }
             }
             let bias = block.bias.map(f64::from);
             let rest = bias.map(f64::tanh);
-            for (&node, sum) in support.iter().zip(&sums).filter(|(_, sum)| **sum != [0.0; FEATURE_COUNT]) {
-                for c in 0..FEATURE_COUNT {
-                    features[node as usize][c] += (bias[c] + sum[c]).tanh() - rest[c];
+            for &k in &active {
+                for &node in &self.components[k].nodes {
+                    // Taken when first met: then it is zero for the block's other components, and for the next block.
+                    let sum = core::mem::replace(&mut sums[node as usize], [0.0; FEATURE_COUNT]);
+                    for c in 0..FEATURE_COUNT {
+                        features[node as usize][c] += (bias[c] + sum[c]).tanh() - rest[c];
+                    }
                 }
             }
         }
@@ -172,29 +181,54 @@ impl<'a> Player<'a> {
         (0..gradients.len()).map(row).collect()
     }
 
-    /// `F D F^T x = b`, in place.
+    /// `F D F^T x = b` by tiles, in place.
     fn substitute(&self, b: &mut [[f64; 3]]) {
         let factor = &self.tier.factor;
-        let column = |j: usize| factor.offsets[j] as usize..factor.offsets[j + 1] as usize;
-        for j in 0..b.len() {
-            let x = b[j];
-            for e in column(j) {
-                let row = &mut b[factor.rows[e] as usize];
-                for c in 0..3 {
-                    row[c] -= f64::from(factor.values[e]) * x[c];
-                }
+        let tile_columns = |column: usize| factor.offsets[column] as usize..factor.offsets[column + 1] as usize;
+        let column_count = factor.inverse_diagonals.len();
+        let mut x = vec![[[0.0; 3]; TILE_SIDE]; column_count];
+        for (lane, b) in x.as_flattened_mut().iter_mut().zip(b.iter()) {
+            *lane = *b;
+        }
+        for column in 0..column_count {
+            let own = x[column];
+            for e in tile_columns(column) {
+                let product = tile_times(&factor.tiles[e], &own, false);
+                subtract(&mut x[factor.rows[e] as usize], &product);
             }
         }
-        for j in (0..b.len()).rev() {
-            let mut x = b[j].map(|x| x * f64::from(factor.inverse_pivots[j]));
-            for e in column(j) {
-                let row = &b[factor.rows[e] as usize];
-                for c in 0..3 {
-                    x[c] -= f64::from(factor.values[e]) * row[c];
-                }
+        for column in (0..column_count).rev() {
+            let mut own = tile_times(&factor.inverse_diagonals[column], &x[column], false);
+            for e in tile_columns(column) {
+                subtract(&mut own, &tile_times(&factor.tiles[e], &x[factor.rows[e] as usize], true));
             }
-            b[j] = x;
+            x[column] = own;
         }
+        for (b, lane) in b.iter_mut().zip(x.as_flattened()) {
+            *b = *lane;
+        }
+    }
+}
+
+/// Four nodes of a right-hand side or a solution.
+type Block = [[f64; 3]; TILE_SIDE];
+
+fn tile_times(tile: &[f32; TILE_ENTRIES], x: &Block, transposed: bool) -> Block {
+    core::array::from_fn(|i| {
+        let mut sum = [0.0; 3];
+        for (j, x) in x.iter().enumerate() {
+            let entry = if transposed { j * TILE_SIDE + i } else { i * TILE_SIDE + j };
+            for c in 0..3 {
+                sum[c] += f64::from(tile[entry]) * x[c];
+            }
+        }
+        sum
+    })
+}
+
+fn subtract(x: &mut Block, y: &Block) {
+    for (x, y) in x.as_flattened_mut().iter_mut().zip(y.as_flattened()) {
+        *x -= y;
     }
 }
 

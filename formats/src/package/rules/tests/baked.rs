@@ -84,38 +84,47 @@ fn ring_rules() {
 #[test]
 fn factor_rules() {
     let tiny = tiny_baked().exact;
-    let entry_count = tiny.factor_rows.len() as u64;
+    let (tile_count, column_count) = (tiny.tile_rows.len() as u64, u64::from(V).div_ceil(4));
+    assert_eq!((tile_count, column_count), (2, 3));
+    let ascends = |index| NotAscending {
+        field: "tile_rows",
+        index,
+    };
+    baked(|t| t.exact.tiles.clear(), counts("tiles", tile_count, 0));
     baked(
-        |t| t.exact.factor_values.clear(),
-        counts("factor_values", entry_count, 0),
+        |t| t.exact.tile_offsets.truncate(3),
+        counts("tile_offsets", column_count + 1, 3),
+    );
+    baked(|t| t.exact.tile_offsets[3] = 0, counts("tile_offsets", tile_count, 0));
+    let one_column = |t: &mut TinyBaked, rows: [u32; 2]| {
+        t.exact.tile_offsets = alloc::vec![0, 2, 2, 2];
+        t.exact.tile_rows = rows.to_vec();
+    };
+    baked(|t| one_column(t, [2, 1]), ascends(1));
+    baked(|t| one_column(t, [1, 3]), beyond("tile_rows", 1, 3, 3));
+    baked(|t| t.exact.tile_rows[0] = 0, ascends(0));
+    baked(|t| t.exact.tiles[1][15] = f32::NAN, not_finite("tiles", 1));
+    let (least, greatest) = (-limits::FACTOR_VALUE, limits::FACTOR_VALUE);
+    let large = OutOfRange {
+        field: "tiles",
+        index: 1,
+        value: -2.0 * greatest,
+        least,
+        greatest,
+    };
+    baked(|t| t.exact.tiles[1][4] = -2.0 * limits::FACTOR_VALUE, large);
+    baked(
+        |t| t.exact.inverse_diagonals.truncate(2),
+        counts("inverse_diagonals", column_count, 2),
+    );
+    baked(|t| t.exact.inverse_diagonals[1][5] = 0.0, PivotNotPositive { index: 5 });
+    baked(
+        |t| t.exact.inverse_diagonals[2][0] = -1.0,
+        PivotNotPositive { index: 8 },
     );
     baked(
-        |t| t.exact.factor_offsets[9] = 0,
-        counts("factor_offsets", entry_count, 0),
-    );
-    baked(
-        |t| t.exact.factor_rows.swap(0, 1),
-        NotAscending {
-            field: "factor_rows",
-            index: 1,
-        },
-    );
-    baked(
-        |t| t.exact.factor_rows[0] = 0,
-        NotAscending {
-            field: "factor_rows",
-            index: 0,
-        },
-    );
-    let last = entry_count as usize - 1;
-    baked(|t| t.exact.factor_rows[last] = V, beyond("factor_rows", last, V, V));
-    baked(|t| t.exact.factor_values[2] = f32::NAN, not_finite("factor_values", 2));
-    baked(|t| t.exact.inverse_pivots.truncate(8), counts("inverse_pivots", 9, 8));
-    baked(|t| t.exact.inverse_pivots[8] = 0.0, PivotNotPositive { index: 8 });
-    baked(|t| t.exact.inverse_pivots[2] = -1.0, PivotNotPositive { index: 2 });
-    baked(
-        |t| t.exact.inverse_pivots[2] = f32::INFINITY,
-        not_finite("inverse_pivots", 2),
+        |t| t.exact.inverse_diagonals[0][1] = f32::INFINITY,
+        not_finite("inverse_diagonals", 0),
     );
 }
 
@@ -214,7 +223,7 @@ fn rules_of_the_fast_tiers_nodes() {
     );
     fast(|t| t.nodes.rest_positions[2][1] = f32::NAN, not_finite(field, 2));
     fast(|t| t.nodes.ring_weights[3] = f32::NAN, not_finite("ring_weights", 3));
-    fast(|t| t.nodes.factor_values[2] = f32::NAN, not_finite("factor_values", 2));
+    fast(|t| t.nodes.tiles[1][0] = f32::NAN, not_finite("tiles", 1));
     fast(|t| t.nodes.support[0] = V, beyond("support", 0, V, V));
     fast(|t| t.nodes.entry_values[7][0] = HALF_NAN, not_finite("entry_values", 7));
 }

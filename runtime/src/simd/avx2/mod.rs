@@ -1,0 +1,4 @@
+//! AVX2 with fused multiply-add: eight lanes.
+
+pub(crate) mod poisson;
+pub(crate) mod skin;

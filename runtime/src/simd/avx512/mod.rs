@@ -1,0 +1,4 @@
+//! AVX-512: sixteen lanes.
+
+pub(crate) mod poisson;
+pub(crate) mod skin;
