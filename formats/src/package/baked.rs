@@ -109,8 +109,8 @@ pub const SKIN_NODES: usize = 4;
 pub const SKIN_WEIGHT_SUM: u32 = u16::MAX as u32;
 
 /// How far the fast tier is from the exact one, measured when the package was baked. Distances are shares of the diagonal
-/// of the rest shape's bounding box. *Mixed* poses draw every control evenly between its stops; *single* ones put one
-/// control at one of its stops and leave the rest at zero.
+/// of the rest shape's bounding box. In *mixed* poses every control moves in a quarter of them, and stands anywhere
+/// between its stops, evenly; *single* ones put one control at one of its stops and leave the rest at zero.
 #[derive(Archive, Serialize, Debug, Clone, Copy, PartialEq)]
 pub struct FastError {
     /// Root mean square distance, over all vertices of the mixed poses.

@@ -49,7 +49,8 @@ impl AnchoredLaplacian<'_> {
             .map(|v| self.weights[self.row(v)].iter().sum())
             .collect();
         let mean = diagonal.iter().sum::<f64>() / diagonal.len() as f64;
-        diagonal[self.anchor_vertex] += mean;
+        // A lone vertex has no edge, and must be held all the same.
+        diagonal[self.anchor_vertex] += if mean > 0.0 { mean } else { 1.0 };
         diagonal
     }
 

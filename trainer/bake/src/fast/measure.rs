@@ -10,8 +10,12 @@ use super::play::{Gradient, Player, Pose, times};
 use super::{Fast, MIXED_SHARE, Source};
 use crate::mesh::topology::{corners, cross, difference, dot, length};
 
-/// Mixed poses and their seed: not those that the skin was fitted to.
-const MIXED_POSES: usize = 96;
+/// Mixed poses: as many as make so many vertices, within these bounds.
+const MIXED_VERTICES: usize = 1 << 21;
+const LEAST_MIXED_POSES: usize = 128;
+const MOST_MIXED_POSES: usize = 1024;
+
+/// Their seed: not that of the poses that the skin was fitted to.
 const MIXED_SEED: u64 = 0x6d69_7865_6470_6f73;
 
 /// Single poses at most: of more, as many evenly spread ones are measured.
@@ -108,7 +112,9 @@ impl<'a> Measure<'a> {
     /// Plays all poses.
     pub fn error(&self) -> FastError {
         let network = self.source.network;
-        let mixed = self.tally(&network.mixed_poses(MIXED_SEED, MIXED_POSES, MIXED_SHARE));
+        let wanted = MIXED_VERTICES / self.source.rest_positions.len().max(1);
+        let mixed_poses = wanted.clamp(LEAST_MIXED_POSES, MOST_MIXED_POSES);
+        let mixed = self.tally(&network.mixed_poses(MIXED_SEED, mixed_poses, MIXED_SHARE));
         let singles = network.single_poses();
         let stride = singles.len().div_ceil(SINGLE_POSES).max(1);
         let singles: Vec<Vec<f64>> = singles.into_iter().step_by(stride).collect();
@@ -120,7 +126,7 @@ impl<'a> Measure<'a> {
             single_rms: single.rms(),
             single_max: single.greatest as f32,
             normal_rms: (mixed.squared_angles / mixed.count.max(1.0)).sqrt() as f32,
-            mixed_poses: MIXED_POSES as u32,
+            mixed_poses: mixed_poses as u32,
         }
     }
 

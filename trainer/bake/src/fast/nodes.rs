@@ -58,6 +58,20 @@ impl<'a> SurfaceGraph<'a> {
         Self { topology, lengths }
     }
 
+    /// Its edges, and others' lengths for them: what is far in the one need not be in the other. Shape: that of the
+    /// topology's ring, not negative.
+    pub fn with_lengths(&self, lengths: Vec<f64>) -> Self {
+        Self {
+            topology: self.topology,
+            lengths,
+        }
+    }
+
+    /// Shape: that of the topology's ring.
+    pub fn lengths(&self) -> &[f64] {
+        &self.lengths
+    }
+
     /// Up to `count` vertices: `first`, then each time the one farthest from all before (the lowest index of equals).
     /// Fewer where the rest stand at the same places.
     pub fn farthest_points(&self, first: usize, count: usize) -> Vec<u32> {

@@ -1,7 +1,7 @@
 //! Plays a tier in f64, on the numbers that are stored: what the skin is fitted to and the error measured against.
 
 use half::f16;
-use rand::{Rng, SeedableRng};
+use rand::{Rng, SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use sinew_formats::package::{BakedBlock, BakedComponent, FEATURE_COUNT, TILE_ENTRIES, TILE_SIDE};
@@ -31,18 +31,22 @@ impl Network<'_> {
         self.blocks.iter().map(|block| block.component_count as usize).collect()
     }
 
-    /// Mixed poses: every control moves with the chance `share`, and then stands anywhere between its stops, evenly.
-    /// Shape: `[count][K]`.
+    /// Mixed poses: every control moves in the given share of them, and then stands between its stops, evenly spread; which
+    /// poses those are is drawn anew for each control. Shape: `[count][K]`.
     pub fn mixed_poses(&self, seed: u64, count: usize, share: f64) -> Vec<Vec<f64>> {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        let mut draw = |component: &BakedComponent<'_>| {
-            let (chance, place): (f64, f64) = (random.random(), random.random());
+        let mut poses = vec![vec![0.0; self.components.len()]; count];
+        let moving = ((share * count as f64).round() as usize).min(count);
+        for (k, component) in self.components.iter().enumerate() {
             let (minimum, maximum) = (f64::from(component.minimum), f64::from(component.maximum));
-            if chance < share { minimum + (maximum - minimum) * place } else { 0.0 }
-        };
-        (0..count)
-            .map(|_| self.components.iter().map(&mut draw).collect())
-            .collect()
+            let mut order: Vec<usize> = (0..count).collect();
+            order.shuffle(&mut random);
+            for (place, &pose) in order[..moving].iter().enumerate() {
+                let along = (place as f64 + random.random::<f64>()) / moving as f64;
+                poses[pose][k] = minimum + (maximum - minimum) * along;
+            }
+        }
+        poses
     }
 
     /// Single poses: each control at each of its stops that is not rest, the others at rest.

@@ -1,0 +1,135 @@
+//! The fast tier against its definitions: the graph's matrix, its rules of motion, and the error it states.
+
+use rayon::ThreadPoolBuilder;
+use sinew_formats::package::{BakedView, CompactView, SKIN_WEIGHT_SUM};
+
+use crate::{BakeOptions, FastNodes, bake_bytes_with, fixture};
+
+fn baked(seed: u64, vertices_a_node: u32) -> sinew_formats::package::AlignedBytes {
+    let options = BakeOptions {
+        fast_nodes: FastNodes::OneIn(vertices_a_node),
+    };
+    bake_bytes_with(&fixture::compact(seed, false), &options).unwrap()
+}
+
+#[test]
+fn nodes_are_vertices_with_their_components() {
+    let bytes = baked(1, 4);
+    let view = BakedView::open(&bytes).unwrap();
+    let (exact, fast) = (view.exact(), view.fast().unwrap());
+    let nodes = fast.nodes();
+    assert_eq!(nodes.node_count(), view.vertex_count() / 4);
+    // A node's own vertex follows it alone.
+    let mut own_vertex = vec![None; nodes.node_count()];
+    for (v, (row, weights)) in fast.skin_nodes().iter().zip(fast.skin_weights()).enumerate() {
+        if weights[0] as u32 == SKIN_WEIGHT_SUM {
+            let at = nodes.rest_positions()[row[0] as usize];
+            if at == fast.rest_positions()[v] {
+                own_vertex[row[0] as usize] = Some(v);
+            }
+        }
+    }
+    let solvers: Vec<u32> = own_vertex
+        .iter()
+        .map(|v| view.solver_from_vertex()[v.expect("every node has its vertex")])
+        .collect();
+    for k in 0..view.component_count() {
+        let block = view.component(k).block as usize;
+        let (slots, values) = exact.entries_of(k);
+        let (node_slots, node_values) = nodes.entries_of(k);
+        let expected: Vec<_> = solvers
+            .iter()
+            .enumerate()
+            .filter_map(|(n, solver)| {
+                let slot = slots.iter().position(|&slot| exact.support_of(block)[slot as usize] == *solver)?;
+                Some((n as u32, values[slot]))
+            })
+            .collect();
+        let found: Vec<_> = node_slots
+            .iter()
+            .zip(node_values)
+            .map(|(&slot, &value)| (nodes.support_of(block)[slot as usize], value))
+            .collect();
+        assert_eq!(found, expected, "component {k}");
+    }
+}
+
+/// `W^T L W`, entry by entry, from the stored skin and the exact tier's rings.
+#[test]
+fn the_graphs_weights_are_the_galerkin_product() {
+    /// Stored in f32, of weights near one.
+    const TOLERANCE: f64 = 1e-5;
+    let bytes = baked(2, 6);
+    let view = BakedView::open(&bytes).unwrap();
+    let (exact, fast) = (view.exact(), view.fast().unwrap());
+    let node_count = fast.nodes().node_count();
+    let skin: Vec<Vec<f64>> = view
+        .vertex_from_solver()
+        .iter()
+        .map(|&v| {
+            let mut row = vec![0.0; node_count];
+            for (&node, &weight) in fast.skin_nodes()[v as usize].iter().zip(&fast.skin_weights()[v as usize]) {
+                row[node as usize] += f64::from(weight) / f64::from(SKIN_WEIGHT_SUM);
+            }
+            row
+        })
+        .collect();
+    let mut product = vec![vec![0.0; node_count]; node_count];
+    for i in 0..view.vertex_count() {
+        for e in exact.ring_offsets()[i] as usize..exact.ring_offsets()[i + 1] as usize {
+            let (j, weight) = (exact.ring()[e] as usize, f64::from(exact.ring_weights()[e]));
+            for a in 0..node_count {
+                for b in 0..node_count {
+                    product[a][b] += 0.5 * weight * (skin[i][a] - skin[j][a]) * (skin[i][b] - skin[j][b]);
+                }
+            }
+        }
+    }
+    let nodes = fast.nodes();
+    for a in 0..node_count {
+        let row = nodes.ring_offsets()[a] as usize..nodes.ring_offsets()[a + 1] as usize;
+        for b in (0..node_count).filter(|&b| b != a) {
+            let stored = nodes.ring()[row.clone()]
+                .binary_search(&(b as u32))
+                .map_or(0.0, |place| f64::from(nodes.ring_weights()[row.start + place]));
+            assert!((stored + product[a][b]).abs() < TOLERANCE, "{a} {b}: {stored} {}", product[a][b]);
+        }
+    }
+}
+
+#[test]
+fn more_nodes_are_nearer_to_the_exact_tier() {
+    let errors = [16, 4, 1].map(|vertices| {
+        let bytes = baked(3, vertices);
+        BakedView::open(&bytes).unwrap().fast().unwrap().error()
+    });
+    let [coarse, fine, own] = errors;
+    assert!(fine.mixed_rms < 0.7 * coarse.mixed_rms, "{errors:?}");
+    assert!(fine.normal_rms < coarse.normal_rms, "{errors:?}");
+    // Every vertex a node: the tiers are one, but for the rounding of the factors.
+    assert!(own.mixed_max < 1e-5 && own.single_max < 1e-5, "{errors:?}");
+    for error in errors {
+        assert!(error.mixed_rms <= error.mixed_p99 && error.mixed_p99 <= error.mixed_max);
+        assert!(error.single_rms <= error.single_max);
+    }
+}
+
+#[test]
+fn same_bytes_on_one_thread_and_on_four() {
+    let on = |thread_count| {
+        let pool = ThreadPoolBuilder::new().num_threads(thread_count).build().unwrap();
+        pool.install(|| baked(5, 8))
+    };
+    assert_eq!(on(1), on(4));
+}
+
+#[test]
+fn any_node_count_makes_a_tier() {
+    let compact = fixture::compact(1, false);
+    let vertex_count = CompactView::open(&compact).unwrap().vertex_count();
+    for (vertices_a_node, expected) in [(0, vertex_count), (u32::MAX, 1), (40, vertex_count / 40)] {
+        let bytes = baked(1, vertices_a_node);
+        let view = BakedView::open(&bytes).unwrap();
+        assert_eq!(view.fast().unwrap().nodes().node_count(), expected);
+    }
+}
