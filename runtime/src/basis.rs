@@ -2,9 +2,7 @@
 
 use core::fmt;
 
-use sinew_formats::package::{
-    BakedBlock, BakedView, FEATURE_COUNT, FastError, FastView, NONE, OpenError, TierView,
-};
+use sinew_formats::package::{BakedBlock, BakedView, FEATURE_COUNT, FastError, FastView, NONE, OpenError, TierView};
 
 use crate::simd::scalar::gradient::FeatureScales;
 use crate::simd::scalar::poisson::{Factor, Rings};

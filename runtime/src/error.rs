@@ -192,7 +192,10 @@ impl fmt::Display for WorkspaceError {
                     "the workspace needs {required_bytes} bytes here and got {actual_bytes}"
                 )
             }
-            Self::NoFastTier => write!(out, "the package has no fast tier; bake it with one, or use the exact tier"),
+            Self::NoFastTier => write!(
+                out,
+                "the package has no fast tier; bake it with one, or use the exact tier"
+            ),
             Self::KernelsMissing { kernels } => {
                 write!(
                     out,

@@ -7,7 +7,9 @@ use std::vec;
 use std::vec::Vec;
 
 use half::f16;
-use sinew_formats::package::{AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedTier, NONE, write_baked};
+use sinew_formats::package::{
+    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedFast, BakedTier, FastError, NONE, write_baked,
+};
 
 use crate::basis::Basis;
 use crate::simd::scalar::naive::Noise;
@@ -219,10 +221,15 @@ impl Package {
 
     /// A 6 by 5 grid; a root block of two components, child blocks of one and of two under them.
     pub(crate) fn small(seed: u64) -> Self {
-        Self::on(&Grid::new(6, 5), seed)
+        Self::on(&Grid::new(6, 5), seed, false)
     }
 
-    fn on(grid: &Grid, seed: u64) -> Self {
+    /// The same with a fast tier whose nodes are all vertices, each followed by its own: both tiers play the same.
+    pub(crate) fn small_with_fast_tier(seed: u64) -> Self {
+        Self::on(&Grid::new(6, 5), seed, true)
+    }
+
+    fn on(grid: &Grid, seed: u64, with_fast_tier: bool) -> Self {
         let mut noise = Noise::new(seed);
         let count = grid.vertex_count() as u32;
         let mut vertex_from_solver = vec![0; count as usize];
@@ -267,6 +274,40 @@ impl Package {
             support_offsets.push(support.len() as u32);
         }
         let factor = factorise(&grid.laplacian());
+        let exact = BakedTier {
+            rest_positions: &grid.rest,
+            ring_offsets: &grid.offsets,
+            ring: &grid.ring,
+            ring_weights: &grid.weights,
+            tile_offsets: &factor.offsets,
+            tile_rows: &factor.rows,
+            tiles: &factor.tiles,
+            inverse_diagonals: &factor.inverse_diagonals,
+            support_offsets: &support_offsets,
+            support: &support,
+            entry_offsets: &entry_offsets,
+            entry_slots: &slots,
+            entry_values: &values,
+        };
+        let rest_in_source_order: Vec<[f32; 3]> =
+            grid.solver_from_vertex.iter().map(|&s| grid.rest[s as usize]).collect();
+        let own_nodes: Vec<[u16; 4]> = grid.solver_from_vertex.iter().map(|&s| [s as u16, 0, 1, 2]).collect();
+        let fast = BakedFast {
+            nodes: exact,
+            centre: [2.5, 2.0, 0.0],
+            rest_positions: &rest_in_source_order,
+            skin_nodes: &own_nodes,
+            skin_weights: &vec![[u16::MAX, 0, 0, 0]; count as usize],
+            error: FastError {
+                mixed_rms: 1e-6,
+                mixed_p99: 1e-6,
+                mixed_max: 1e-6,
+                single_rms: 1e-6,
+                single_max: 1e-6,
+                normal_rms: 1e-6,
+                mixed_poses: 1,
+            },
+        };
         let bytes = write_baked(&BakedBasis {
             compact_id: [7; 16],
             faces: &grid.faces,
@@ -276,25 +317,10 @@ impl Package {
             stretch_scale: 0.4,
             blocks: &blocks,
             components: &components,
-            exact: BakedTier {
-                rest_positions: &grid.rest,
-                ring_offsets: &grid.offsets,
-                ring: &grid.ring,
-                ring_weights: &grid.weights,
-                tile_offsets: &factor.offsets,
-                tile_rows: &factor.rows,
-                tiles: &factor.tiles,
-                inverse_diagonals: &factor.inverse_diagonals,
-                support_offsets: &support_offsets,
-                support: &support,
-                entry_offsets: &entry_offsets,
-                entry_slots: &slots,
-                entry_values: &values,
-            },
-            fast: None,
+            exact,
+            fast: with_fast_tier.then_some(fast),
         })
         .unwrap();
-        let rest_in_source_order = grid.solver_from_vertex.iter().map(|&s| grid.rest[s as usize]).collect();
         Self {
             bytes,
             rest_in_source_order,

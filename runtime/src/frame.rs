@@ -104,6 +104,8 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
+    use crate::Kernels;
+    use crate::WorkspaceLayout;
     use crate::fixture::{Package, memory_for, open, workspace_in};
     use crate::simd::scalar::surface::FALLBACK_NORMAL;
 
@@ -309,5 +311,83 @@ mod tests {
             short(Buffer::Normals, count - 1)
         );
         assert_eq!(run(&controls, count, 0, &mut workspace), short(Buffer::Normals, 0));
+    }
+
+    fn fast_workspace<'w>(basis: &Basis<'_>, memory: &'w mut [u8], kernels: Kernels) -> Workspace<'w> {
+        Workspace::for_tier(basis, TierChoice::Fast, memory, kernels).unwrap()
+    }
+
+    fn fast_memory(basis: &Basis<'_>) -> Vec<u8> {
+        let layout = WorkspaceLayout::for_tier(basis, TierChoice::Fast).unwrap();
+        vec![0xff; layout.unaligned_bytes()]
+    }
+
+    #[test]
+    fn a_fast_tier_of_all_vertices_plays_like_the_exact_one() {
+        /// Roundings of a map about the middle of a mesh of size 6.
+        const TOLERANCE: f32 = 5e-6;
+        let package = Package::small_with_fast_tier(1);
+        let basis = open(&package);
+        for kernels in [Kernels::Scalar, Kernels::detect()] {
+            let (mut one, mut two) = (memory_for(&basis), fast_memory(&basis));
+            let mut exact = Workspace::with_kernels(&basis, &mut one, kernels).unwrap();
+            let mut fast = fast_workspace(&basis, &mut two, kernels);
+            let (_, expected, expected_normals) = frame(&basis, &WEIGHTS, &mut exact);
+            let (outcome, positions, normals) = frame(&basis, &WEIGHTS, &mut fast);
+            assert_eq!(outcome, Ok(FrameOutcome::Solved));
+            assert!(farthest(&positions, &expected) < TOLERANCE);
+            assert!(farthest(&normals, &expected_normals) < 10.0 * TOLERANCE);
+            assert_eq!(
+                frame(&basis, &WEIGHTS, &mut fast),
+                (Ok(FrameOutcome::Unchanged), positions, normals)
+            );
+
+            let neutral = [0.0; Package::COMPONENTS];
+            let (outcome, positions, _) = frame(&basis, &neutral, &mut fast);
+            assert_eq!(
+                (outcome, positions),
+                (Ok(FrameOutcome::Solved), package.rest_in_source_order.clone())
+            );
+        }
+    }
+
+    #[test]
+    fn overflow_in_the_fast_tier_gives_the_rest_mesh() {
+        let package = Package::small_with_fast_tier(1);
+        let basis = open(&package);
+        let mut memory = fast_memory(&basis);
+        let mut workspace = fast_workspace(&basis, &mut memory, Kernels::detect());
+        let before = frame(&basis, &WEIGHTS, &mut workspace).1;
+        for map in workspace.maps.iter_mut() {
+            map[1][1] = f32::INFINITY;
+        }
+        let (outcome, positions, _) = frame(&basis, &WEIGHTS, &mut workspace);
+        assert!(matches!(outcome, Err(FrameError::NotFinite { .. })), "{outcome:?}");
+        assert_eq!(positions, package.rest_in_source_order);
+        let (outcome, positions, _) = frame(&basis, &WEIGHTS, &mut workspace);
+        assert_eq!((outcome, positions), (Ok(FrameOutcome::Solved), before));
+    }
+
+    #[test]
+    fn jobs_of_the_exact_tier_refuse_a_workspace_of_the_fast_one() {
+        let package = Package::small_with_fast_tier(1);
+        let basis = open(&package);
+        let mut memory = fast_memory(&basis);
+        let mut workspace = fast_workspace(&basis, &mut memory, Kernels::Scalar);
+        let mut output = vec![[9.0; 3]; basis.vertex_count()];
+        let tangent = crate::Tangent {
+            basis: &basis,
+            component: 0,
+            displacement: &mut output,
+        };
+        assert_eq!(tangent.run(&mut workspace), Err(FrameError::NeedsExactTier));
+        let features = vec![[0.0; crate::FEATURE_COUNT]; basis.vertex_count()];
+        let reconstruct = crate::Reconstruct {
+            basis: &basis,
+            features: &features,
+            positions: &mut output,
+        };
+        assert_eq!(reconstruct.run(&mut workspace), Err(FrameError::NeedsExactTier));
+        assert!(output.iter().all(|p| *p == [9.0; 3]), "nothing was written");
     }
 }

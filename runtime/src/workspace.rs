@@ -334,6 +334,31 @@ mod tests {
     }
 
     #[test]
+    fn the_fast_tier_is_refused_where_there_is_none_and_carved_where_there_is() {
+        let (with, without) = (Package::small_with_fast_tier(1), Package::small(1));
+        let (with, without) = (open(&with), open(&without));
+        let none = Err(WorkspaceError::NoFastTier);
+        assert_eq!(WorkspaceLayout::for_tier(&without, TierChoice::Fast), none);
+        let (mut memory, kernels) = (vec![0_u8; 100_000], Kernels::Scalar);
+        let mut made = |basis, tier| {
+            let workspace = Workspace::for_tier(basis, tier, &mut memory, kernels);
+            workspace.map(|workspace| (workspace.tier(), workspace.maps.len(), workspace.solution.len()))
+        };
+        assert_eq!(made(&without, TierChoice::Fast), Err(WorkspaceError::NoFastTier));
+        let nodes = with.fast_node_count().unwrap();
+        assert_eq!(made(&with, TierChoice::Fast), Ok((TierChoice::Fast, nodes, 0)));
+        let padded = nodes.next_multiple_of(BLOCK);
+        assert_eq!(made(&with, TierChoice::Exact), Ok((TierChoice::Exact, 0, padded)));
+
+        let layout = WorkspaceLayout::for_tier(&with, TierChoice::Fast).unwrap();
+        let mut memory = vec![0xff_u8; layout.unaligned_bytes()];
+        let mut fits =
+            |bytes: usize| Workspace::for_tier(&with, TierChoice::Fast, &mut memory[..bytes], kernels).is_ok();
+        assert!(fits(layout.unaligned_bytes()));
+        assert!(!fits(layout.size_bytes - 1));
+    }
+
+    #[test]
     fn layout_says_what_the_documentation_says() {
         let package = Package::small(1);
         let basis = open(&package);

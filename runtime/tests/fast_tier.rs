@@ -72,7 +72,11 @@ impl Noise {
         let controls = basis.components();
         let weights = controls.map(|control| {
             let (moves, along) = (self.next() < MIXED_SHARE, self.next() as f32);
-            if moves { control.minimum + (control.maximum - control.minimum) * along } else { 0.0 }
+            if moves {
+                control.minimum + (control.maximum - control.minimum) * along
+            } else {
+                0.0
+            }
         });
         weights.collect()
     }
@@ -83,7 +87,8 @@ fn distance(a: &[f32; 3], b: &[f32; 3]) -> f64 {
 }
 
 fn diagonal(positions: &[[f32; 3]]) -> f64 {
-    let bound = |fold: fn(f32, f32) -> f32, start| core::array::from_fn(|c| positions.iter().map(|p| p[c]).fold(start, fold));
+    let bound =
+        |fold: fn(f32, f32) -> f32, start| core::array::from_fn(|c| positions.iter().map(|p| p[c]).fold(start, fold));
     distance(&bound(f32::min, f32::INFINITY), &bound(f32::max, f32::NEG_INFINITY))
 }
 
@@ -93,7 +98,10 @@ fn rms(values: &[f64]) -> f64 {
 
 fn agree(name: &str, stored: f32, found: f64, tolerance: f64) {
     let stored = f64::from(stored);
-    assert!((found - stored).abs() <= tolerance * stored, "{name}: stored {stored:.3e}, found {found:.3e}");
+    assert!(
+        (found - stored).abs() <= tolerance * stored,
+        "{name}: stored {stored:.3e}, found {found:.3e}"
+    );
 }
 
 #[test]
@@ -119,7 +127,12 @@ fn the_stored_error_is_true() {
         distances.sort_by(f64::total_cmp);
         let percentile = distances[distances.len() * 99 / 100];
         agree("mixed_p99", stored.mixed_p99, percentile, FIGURES_TOLERANCE);
-        agree("mixed_max", stored.mixed_max, distances[distances.len() - 1], MAXIMUM_TOLERANCE);
+        agree(
+            "mixed_max",
+            stored.mixed_max,
+            distances[distances.len() - 1],
+            MAXIMUM_TOLERANCE,
+        );
 
         let mut distances = Vec::new();
         for (k, control) in basis.components().enumerate() {
@@ -132,7 +145,12 @@ fn the_stored_error_is_true() {
         }
         // The same poses.
         agree("single_rms", stored.single_rms, rms(&distances), 0.01);
-        agree("single_max", stored.single_max, distances.into_iter().fold(0.0, f64::max), 0.01);
+        agree(
+            "single_max",
+            stored.single_max,
+            distances.into_iter().fold(0.0, f64::max),
+            0.01,
+        );
     }
 }
 
@@ -155,9 +173,16 @@ fn a_workspace_of_the_fast_tier_is_small() {
     let bytes = baked(1, 8);
     let basis = Basis::open(&bytes).unwrap();
     let bytes_of = |tier| WorkspaceLayout::for_tier(&basis, tier).unwrap().size_bytes;
-    assert_eq!(bytes_of(TierChoice::Exact), WorkspaceLayout::for_basis(&basis).size_bytes);
+    assert_eq!(
+        bytes_of(TierChoice::Exact),
+        WorkspaceLayout::for_basis(&basis).size_bytes
+    );
     let limit = 200 * basis.fast_node_count().unwrap() + 4 * basis.component_count() + 6 * 64;
-    assert!(bytes_of(TierChoice::Fast) <= limit, "{} {limit}", bytes_of(TierChoice::Fast));
+    assert!(
+        bytes_of(TierChoice::Fast) <= limit,
+        "{} {limit}",
+        bytes_of(TierChoice::Fast)
+    );
 }
 
 /// One basis, many workspaces on many threads, both tiers: the same bits as alone.
@@ -166,7 +191,10 @@ fn a_crowd_shares_one_basis() {
     let bytes = baked(2, 8);
     let basis = Basis::open(&bytes).unwrap();
     let poses: Vec<Vec<f32>> = (0..16).map(|seed| Noise(seed).mixed(&basis)).collect();
-    let alone: Vec<_> = poses.iter().map(|pose| Tiers::new(&basis, Kernels::detect()).play(pose)).collect();
+    let alone: Vec<_> = poses
+        .iter()
+        .map(|pose| Tiers::new(&basis, Kernels::detect()).play(pose))
+        .collect();
     let together: Vec<_> = std::thread::scope(|scope| {
         let basis = &basis;
         let threads: Vec<_> = poses

@@ -3,8 +3,8 @@
 use rkyv::{api::low::access, rancor::Failure};
 
 use super::{
-    ArchivedBakedBasis, ArchivedBakedFast, ArchivedBakedTier, BakedBlock, BakedComponent, FEATURE_COUNT, FastError, Header,
-    OpenError, PackageKind, SKIN_NODES, TILE_ENTRIES, TILE_SIDE,
+    ArchivedBakedBasis, ArchivedBakedFast, ArchivedBakedTier, BakedBlock, BakedComponent, FEATURE_COUNT, FastError,
+    Header, OpenError, PackageKind, SKIN_NODES, TILE_ENTRIES, TILE_SIDE,
     open::{native, payload},
     rules,
 };

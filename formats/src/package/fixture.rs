@@ -10,8 +10,8 @@ use half::f16;
 
 use super::{
     BakedBasis, BakedBlock, BakedComponent, BakedFast, BakedTier, BlockRecord, CompactBasis, ComponentRecord,
-    FEATURE_COUNT, FastError, GraphConvRecord, Header, NONE, PackageKind, Provenance, Quality, SKIN_NODES, TILE_ENTRIES,
-    TILE_SIDE, write_compact,
+    FEATURE_COUNT, FastError, GraphConvRecord, Header, NONE, PackageKind, Provenance, Quality, SKIN_NODES,
+    TILE_ENTRIES, TILE_SIDE, write_compact,
 };
 
 /// V of the grid.

@@ -20,8 +20,8 @@ mod write;
 
 pub use baked::{
     ArchivedBakedBasis, ArchivedBakedBlock, ArchivedBakedComponent, ArchivedBakedFast, ArchivedBakedTier,
-    ArchivedFastError, BakedBasis, BakedBlock, BakedComponent, BakedFast, BakedTier, FastError, OnCacheLines, SKIN_NODES,
-    SKIN_WEIGHT_SUM, TILE_ENTRIES, TILE_SIDE,
+    ArchivedFastError, BakedBasis, BakedBlock, BakedComponent, BakedFast, BakedTier, FastError, OnCacheLines,
+    SKIN_NODES, SKIN_WEIGHT_SUM, TILE_ENTRIES, TILE_SIDE,
 };
 pub use baked_view::{BakedView, FastView, TierView};
 pub use basis::{

@@ -33,7 +33,10 @@ impl NodeGraph {
         let mut lower: Vec<BTreeMap<u32, f64>> = vec![BTreeMap::new(); node_count];
         let topology = &surface.topology;
         for v in 0..topology.vertex_count {
-            for entry in topology.entries_of(v).filter(|&entry| topology.ring[entry] as usize > v) {
+            for entry in topology
+                .entries_of(v)
+                .filter(|&entry| topology.ring[entry] as usize > v)
+            {
                 let difference = weight_difference(skin, v, topology.ring[entry] as usize);
                 for &(a, of_a) in &difference {
                     for &(b, of_b) in difference.iter().filter(|&&(b, _)| b < a) {
@@ -78,7 +81,11 @@ impl NodeGraph {
 fn weight_difference(skin: &Skin, from: usize, to: usize) -> Vec<(u32, f64)> {
     let mut difference: Vec<(u32, f64)> = Vec::with_capacity(8);
     for (v, sign) in [(from, 1.0), (to, -1.0)] {
-        for (&node, &weight) in skin.nodes[v].iter().zip(&skin.weights[v]).filter(|&(_, &weight)| weight > 0) {
+        for (&node, &weight) in skin.nodes[v]
+            .iter()
+            .zip(&skin.weights[v])
+            .filter(|&(_, &weight)| weight > 0)
+        {
             let share = sign * f64::from(weight) / f64::from(SKIN_WEIGHT_SUM);
             match difference.iter_mut().find(|(other, _)| *other == u32::from(node)) {
                 Some((_, sum)) => *sum += share,

@@ -79,7 +79,11 @@ impl Tally {
         for (bin, &count) in self.bins.iter().enumerate() {
             counted += count;
             if counted >= wanted {
-                let upper = if bin == 0 { 0.0 } else { LEAST_BINNED * (BIN_WIDTH * bin as f64).exp() };
+                let upper = if bin == 0 {
+                    0.0
+                } else {
+                    LEAST_BINNED * (BIN_WIDTH * bin as f64).exp()
+                };
                 return upper.min(self.greatest) as f32;
             }
         }
@@ -150,7 +154,11 @@ impl<'a> Measure<'a> {
         let mut tally = Tally::new();
         for (d, e) in skinned.iter().zip(&exact.displacement) {
             let distance = length(difference(*d, *e));
-            let share = if self.diagonal > 0.0 { distance / self.diagonal } else { 0.0 };
+            let share = if self.diagonal > 0.0 {
+                distance / self.diagonal
+            } else {
+                0.0
+            };
             tally.count += 1.0;
             tally.squares += share * share;
             tally.greatest = tally.greatest.max(share);
@@ -161,7 +169,10 @@ impl<'a> Measure<'a> {
             pairs.map(|(r, d)| core::array::from_fn(|c| r[c] + d[c])).collect()
         };
         let faces = &self.source.surface.topology.faces;
-        let (a, b) = (normals(faces, &moved(&exact.displacement)), normals(faces, &moved(&skinned)));
+        let (a, b) = (
+            normals(faces, &moved(&exact.displacement)),
+            normals(faces, &moved(&skinned)),
+        );
         for (a, b) in a.iter().zip(&b) {
             let angle = length(cross(*a, *b)).atan2(dot(*a, *b));
             tally.squared_angles += angle * angle;
@@ -229,7 +240,10 @@ mod tests {
             tally.bins[bin(share)] += 1;
         }
         let found = f64::from(tally.percentile_99());
-        assert!((0.99e-3..=0.99e-3 * (1.0 + 2.0 * BIN_WIDTH)).contains(&found), "{found}");
+        assert!(
+            (0.99e-3..=0.99e-3 * (1.0 + 2.0 * BIN_WIDTH)).contains(&found),
+            "{found}"
+        );
         assert_eq!((bin(0.0), bin(1e-10), bin(10.0)), (0, 0, BINS - 1));
     }
 }

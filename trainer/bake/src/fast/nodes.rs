@@ -54,7 +54,9 @@ impl<'a> SurfaceGraph<'a> {
     /// Measures the edges. Shape: `rest` `[V]`.
     pub fn new(topology: &'a Topology, rest: &[[f64; 3]]) -> Self {
         let edges = (0..topology.vertex_count).flat_map(|v| topology.ring_of(v).iter().map(move |&j| (v, j)));
-        let lengths = edges.map(|(v, j)| length(difference(rest[v], rest[j as usize]))).collect();
+        let lengths = edges
+            .map(|(v, j)| length(difference(rest[v], rest[j as usize])))
+            .collect();
         Self { topology, lengths }
     }
 

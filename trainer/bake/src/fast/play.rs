@@ -96,7 +96,9 @@ impl<'a> Player<'a> {
             let values = component.values.iter();
             Component {
                 nodes: component.solver_indices.clone(),
-                values: values.map(|halves| halves.map(|bits| scale * f16::from_bits(bits).to_f64())).collect(),
+                values: values
+                    .map(|halves| halves.map(|bits| scale * f16::from_bits(bits).to_f64()))
+                    .collect(),
             }
         });
         Self {
@@ -204,7 +206,10 @@ impl<'a> Player<'a> {
         for column in (0..column_count).rev() {
             let mut own = tile_times(&factor.inverse_diagonals[column], &x[column], false);
             for e in tile_columns(column) {
-                subtract(&mut own, &tile_times(&factor.tiles[e], &x[factor.rows[e] as usize], true));
+                subtract(
+                    &mut own,
+                    &tile_times(&factor.tiles[e], &x[factor.rows[e] as usize], true),
+                );
             }
             x[column] = own;
         }
@@ -221,7 +226,11 @@ fn tile_times(tile: &[f32; TILE_ENTRIES], x: &Block, transposed: bool) -> Block 
     core::array::from_fn(|i| {
         let mut sum = [0.0; 3];
         for (j, x) in x.iter().enumerate() {
-            let entry = if transposed { j * TILE_SIDE + i } else { i * TILE_SIDE + j };
+            let entry = if transposed {
+                j * TILE_SIDE + i
+            } else {
+                i * TILE_SIDE + j
+            };
             for c in 0..3 {
                 sum[c] += f64::from(tile[entry]) * x[c];
             }
@@ -245,17 +254,7 @@ pub fn times(matrix: &Gradient, x: &[f64; 3]) -> [f64; 3] {
 fn gradient(x: &[f64; FEATURE_COUNT]) -> Gradient {
     let r = nalgebra::Vector3::new(x[0], x[1], x[2]);
     let rotation = nalgebra::Rotation3::new(r).into_inner();
-    let stretch = nalgebra::Matrix3::new(
-        1.0 + x[3],
-        x[4],
-        x[5],
-        x[4],
-        1.0 + x[6],
-        x[7],
-        x[5],
-        x[7],
-        1.0 + x[8],
-    );
+    let stretch = nalgebra::Matrix3::new(1.0 + x[3], x[4], x[5], x[4], 1.0 + x[6], x[7], x[5], x[7], 1.0 + x[8]);
     let d = rotation * stretch - nalgebra::Matrix3::identity();
     core::array::from_fn(|n| d[(n / 3, n % 3)])
 }

@@ -55,9 +55,8 @@ impl Skin {
                         let node = nodes[near.node as usize] as usize;
                         let arm = core::array::from_fn(|c| rest[v][c] - rest[node][c]);
                         let turned = times(&pose.gradients[node], &arm);
-                        *error = core::array::from_fn(|c| {
-                            turned[c] + pose.displacement[node][c] - pose.displacement[v][c]
-                        });
+                        *error =
+                            core::array::from_fn(|c| turned[c] + pose.displacement[node][c] - pose.displacement[v][c]);
                     }
                     add_products(gram, &errors);
                 }
@@ -97,7 +96,9 @@ fn row(near: &[Near], gram: &Gram) -> ([u16; SKIN_NODES], [u16; SKIN_NODES]) {
 fn distance_weights(near: &[Near]) -> Vec<f64> {
     let own = near.len().min(SKIN_NODES);
     // Where there is no fifth: a little beyond the last.
-    let beyond = near.get(SKIN_NODES).map_or(1.25 * near[own - 1].distance, |fifth| fifth.distance);
+    let beyond = near
+        .get(SKIN_NODES)
+        .map_or(1.25 * near[own - 1].distance, |fifth| fifth.distance);
     let falling = |near: &Near| (1.0 - near.distance / beyond).max(0.0).powi(2);
     let mut weights: Vec<f64> = near.iter().take(own).map(falling).collect();
     let sum: f64 = weights.iter().sum();
@@ -136,14 +137,15 @@ fn fitted(gram: &Gram, prior: &[f64]) -> Vec<(usize, f64)> {
 /// The minimum over weights of sum one, of either sign: `(G + pull) w = pull prior + mu`.
 fn minimum(gram: &Gram, left: &[usize], prior: &[f64], pull: f64) -> Vec<f64> {
     let n = left.len();
-    let matrix = nalgebra::DMatrix::from_fn(n, n, |i, j| {
-        gram[left[i]][left[j]] + if i == j { pull } else { 0.0 }
-    });
+    let matrix = nalgebra::DMatrix::from_fn(n, n, |i, j| gram[left[i]][left[j]] + if i == j { pull } else { 0.0 });
     let sides = nalgebra::DMatrix::from_fn(n, 2, |i, side| if side == 0 { pull * prior[left[i]] } else { 1.0 });
     // Definite: a sum of squares and a positive diagonal.
     let Some(factor) = matrix.cholesky() else {
         let sum: f64 = left.iter().map(|&i| prior[i]).sum();
-        return left.iter().map(|&i| if sum > 0.0 { prior[i] / sum } else { 1.0 / n as f64 }).collect();
+        return left
+            .iter()
+            .map(|&i| if sum > 0.0 { prior[i] / sum } else { 1.0 / n as f64 })
+            .collect();
     };
     let solved = factor.solve(&sides);
     let mu = (1.0 - solved.column(0).sum()) / solved.column(1).sum();

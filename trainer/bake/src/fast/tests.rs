@@ -41,7 +41,9 @@ fn nodes_are_vertices_with_their_components() {
             .iter()
             .enumerate()
             .filter_map(|(n, solver)| {
-                let slot = slots.iter().position(|&slot| exact.support_of(block)[slot as usize] == *solver)?;
+                let slot = slots
+                    .iter()
+                    .position(|&slot| exact.support_of(block)[slot as usize] == *solver)?;
                 Some((n as u32, values[slot]))
             })
             .collect();
@@ -68,7 +70,10 @@ fn the_graphs_weights_are_the_galerkin_product() {
         .iter()
         .map(|&v| {
             let mut row = vec![0.0; node_count];
-            for (&node, &weight) in fast.skin_nodes()[v as usize].iter().zip(&fast.skin_weights()[v as usize]) {
+            for (&node, &weight) in fast.skin_nodes()[v as usize]
+                .iter()
+                .zip(&fast.skin_weights()[v as usize])
+            {
                 row[node as usize] += f64::from(weight) / f64::from(SKIN_WEIGHT_SUM);
             }
             row
@@ -92,7 +97,11 @@ fn the_graphs_weights_are_the_galerkin_product() {
             let stored = nodes.ring()[row.clone()]
                 .binary_search(&(b as u32))
                 .map_or(0.0, |place| f64::from(nodes.ring_weights()[row.start + place]));
-            assert!((stored + product[a][b]).abs() < TOLERANCE, "{a} {b}: {stored} {}", product[a][b]);
+            assert!(
+                (stored + product[a][b]).abs() < TOLERANCE,
+                "{a} {b}: {stored} {}",
+                product[a][b]
+            );
         }
     }
 }

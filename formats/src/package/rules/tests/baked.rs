@@ -243,12 +243,18 @@ fn skin_rules() {
 #[test]
 fn the_fast_tier_has_the_exact_rest_shape_and_finite_figures() {
     let v = u64::from(V);
-    fast(|t| t.rest_positions.truncate(8), counts("fast.rest_positions", v, v - 1));
+    fast(
+        |t| t.rest_positions.truncate(8),
+        counts("fast.rest_positions", v, v - 1),
+    );
     fast(|t| t.rest_positions[6][2] += 0.5, RestDiffers { vertex: 6 });
     fast(|t| t.rest_positions.swap(1, 2), RestDiffers { vertex: 1 });
     fast(|t| t.centre[1] = f32::INFINITY, not_finite("fast.centre", 0));
     fast(|t| t.error.mixed_rms = f32::NAN, not_finite("fast.error.mixed_rms", 0));
-    fast(|t| t.error.single_max = f32::NAN, not_finite("fast.error.single_max", 0));
+    fast(
+        |t| t.error.single_max = f32::NAN,
+        not_finite("fast.error.single_max", 0),
+    );
     let (least, greatest, value) = (0.0, limits::QUALITY, -1.0);
     let negative = |field| OutOfRange {
         field,
