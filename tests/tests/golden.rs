@@ -68,7 +68,10 @@ fn describe_baked(view: &BakedView<'_>) -> String {
     line("stretch_scale", &view.stretch_scale());
     view.blocks().for_each(|block| line("block", &block));
     view.components().for_each(|component| line("component", &component));
-    for (name, tier) in [("exact", Some(view.exact())), ("fast", view.fast().map(|fast| fast.nodes()))] {
+    for (name, tier) in [
+        ("exact", Some(view.exact())),
+        ("fast", view.fast().map(|fast| fast.nodes())),
+    ] {
         if let Some(tier) = tier {
             describe_tier(&tier, &mut |field, value| line(&format!("{name}.{field}"), value));
         }

@@ -6,8 +6,8 @@ use std::alloc::System;
 
 use sinew_formats::package::{fixture::tiny_baked, write_baked};
 use sinew_runtime::{
-    Basis, ControlError, Controls, Frame, FrameError, FrameOutcome, Normals, OpenError, Reconstruct, Tangent,
-    Workspace, WorkspaceError, WorkspaceLayout,
+    Basis, ControlError, Controls, Frame, FrameError, FrameOutcome, Kernels, Normals, OpenError, Reconstruct, Tangent,
+    TierChoice, Workspace, WorkspaceError, WorkspaceLayout,
 };
 
 thread_local! {
@@ -110,6 +110,38 @@ fn a_thousand_frames_allocate_nothing() {
     });
     assert_eq!(count, 0);
     assert!(solved > 600, "{solved} frames had work to do");
+}
+
+#[test]
+fn frames_of_the_fast_tier_allocate_nothing() {
+    let mut tiny = tiny_baked();
+    tiny.fast = Some(tiny.own_nodes());
+    let bytes = write_baked(&tiny.basis()).expect("the fixture is valid");
+    let layout = WorkspaceLayout::for_tier(&Basis::open(&bytes).expect("valid"), TierChoice::Fast).expect("it has one");
+    let mut memory = vec![0; layout.unaligned_bytes()];
+    let mut weights = [0.0; sinew_formats::package::fixture::COMPONENT_COUNT];
+    let mut positions = [[0.0; 3]; sinew_formats::package::fixture::VERTEX_COUNT];
+    let mut normals = positions;
+    let count = requests(|| {
+        let basis = Basis::open(&bytes).expect("valid");
+        let kernels = Kernels::detect();
+        let made = Workspace::for_tier(&basis, TierChoice::Fast, &mut memory, kernels);
+        let mut workspace = made.expect("enough memory");
+        let mut controls = Controls::new(&basis, &mut weights).expect("one weight a component");
+        for frame in 0..1000 {
+            let k = frame % basis.component_count();
+            controls.set(k, (frame as f32 * 0.1).sin()).expect("finite");
+            let job = Frame {
+                basis: &basis,
+                controls: &controls,
+                positions: &mut positions,
+                normals: Some(&mut normals),
+            };
+            job.run(&mut workspace).expect("finite");
+        }
+        assert!(basis.fast_error().is_some());
+    });
+    assert_eq!(count, 0);
 }
 
 #[test]

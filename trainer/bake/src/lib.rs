@@ -71,6 +71,26 @@ pub enum FastNodes {
     OneIn(u32),
 }
 
+/// A text that is not `none` and not `V/` with a whole number of at least 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("expected `none`, or `V/8` for a node to every eight vertices")]
+pub struct FastNodesError;
+
+impl core::str::FromStr for FastNodes {
+    type Err = FastNodesError;
+
+    fn from_str(text: &str) -> Result<Self, FastNodesError> {
+        if text == "none" {
+            return Ok(Self::None);
+        }
+        let vertices = text.strip_prefix("V/").and_then(|number| number.parse().ok());
+        match vertices {
+            Some(vertices) if vertices > 0 => Ok(Self::OneIn(vertices)),
+            _ => Err(FastNodesError),
+        }
+    }
+}
+
 /// Bakes the compact package in `bytes`; see [`bake`].
 /// Errors: those of [`bake`], and [`BakeError::Unreadable`].
 pub fn bake_bytes(bytes: &[u8]) -> Result<AlignedBytes, BakeError> {

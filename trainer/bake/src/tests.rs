@@ -113,3 +113,13 @@ fn refusals() {
         Err(BakeError::NotPositive { .. })
     ));
 }
+
+#[test]
+fn node_counts_are_read_as_they_are_written() {
+    assert_eq!("none".parse(), Ok(FastNodes::None));
+    assert_eq!("V/8".parse(), Ok(FastNodes::OneIn(8)));
+    assert_eq!("V/1".parse(), Ok(FastNodes::OneIn(1)));
+    for wrong in ["", "8", "V/0", "V/-8", "V/8.5", "v/8", "V/99999999999", "None"] {
+        assert_eq!(wrong.parse::<FastNodes>(), Err(FastNodesError), "{wrong}");
+    }
+}

@@ -8,7 +8,7 @@ use clap::Args;
 use miette::{IntoDiagnostic, WrapErr};
 use sinew_formats::interchange::write_sequence_npy;
 use sinew_formats::package::{CompactView, save_package};
-use sinew_trainer::bake::bake;
+use sinew_trainer::bake::{BakeOptions, bake_with};
 use sinew_trainer::config::TrainConfig;
 use sinew_trainer::evaluate::{EvaluationInput, evaluate};
 use sinew_trainer::learn::prepare::Prepared;
@@ -81,7 +81,7 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<(), Failure> 
     let package = folder.join("creature.sinew");
     save_package(&package, &learned.package).into_diagnostic()?;
     let view = CompactView::open(&learned.package).into_diagnostic()?;
-    let baked = bake(&view).into_diagnostic()?;
+    let baked = bake_with(&view, &BakeOptions::default()).into_diagnostic()?;
     save_package(&folder.join("creature.baked.sinew"), &baked).into_diagnostic()?;
 
     let test = test_shapes(&sequence, &view, None)?;

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::Args;
 use miette::{IntoDiagnostic, WrapErr};
 use serde_json::json;
-use sinew_formats::package::{BakedView, CompactView, ComponentRecord, NONE, PackageKind};
+use sinew_formats::package::{BakedView, CompactView, ComponentRecord, FastView, NONE, PackageKind};
 
 use super::{Failure, load_package};
 
@@ -199,6 +199,18 @@ fn print_block(
     }
 }
 
+fn fast_json(fast: &FastView<'_>) -> serde_json::Value {
+    let error = fast.error();
+    json!({
+        "nodes": fast.nodes().node_count(),
+        "error": {
+            "mixed_rms": error.mixed_rms, "mixed_p99": error.mixed_p99, "mixed_max": error.mixed_max,
+            "single_rms": error.single_rms, "single_max": error.single_max, "normal_rms": error.normal_rms,
+            "mixed_poses": error.mixed_poses,
+        },
+    })
+}
+
 fn print_baked(out: &mut String, view: &BakedView<'_>, byte_count: usize, as_json: bool) {
     let exact = view.exact();
     let components: Vec<_> = view
@@ -212,7 +224,7 @@ fn print_baked(out: &mut String, view: &BakedView<'_>, byte_count: usize, as_jso
         let summary = json!({
             "kind": "baked", "content_id": hex(view.content_id()), "compact_id": hex(view.compact_id()), "bytes": byte_count,
             "vertices": view.vertex_count(), "faces": view.faces().len(), "blocks": view.block_count(),
-            "factor_tiles": exact.tiles().len(), "components": components,
+            "factor_tiles": exact.tiles().len(), "components": components, "fast": view.fast().map(|fast| fast_json(&fast)),
         });
         let _ = writeln!(out, "{summary:#}");
         return;
@@ -239,6 +251,9 @@ fn print_baked(out: &mut String, view: &BakedView<'_>, byte_count: usize, as_jso
         view.component_count(),
         view.block_count()
     );
+    if let Some(fast) = view.fast() {
+        let _ = writeln!(out, "  {}", super::bake::describe(&fast));
+    }
     let _ = writeln!(out);
     let _ = writeln!(out, "{:<18} {:>18} {:>9}", "component", "range", "vertices");
     for (k, c) in view.components().enumerate() {
