@@ -7,11 +7,12 @@ use serde_json::Value;
 use sinew_tests::workspace_folder;
 
 /// `(crate, what it may depend on)`, within the workspace.
-const ARROWS: [(&str, &[&str]); 6] = [
+const ARROWS: [(&str, &[&str]); 7] = [
     ("sinew-formats", &[]),
     ("sinew-runtime", &["sinew-formats"]),
     ("sinew-bake", &["sinew-formats"]),
     ("sinew-synthesize", &["sinew-formats"]),
+    ("sinew-peers", &["sinew-formats", "sinew-bake", "sinew-synthesize"]),
     (
         "sinew-trainer",
         &["sinew-formats", "sinew-runtime", "sinew-bake", "sinew-synthesize"],
@@ -20,7 +21,7 @@ const ARROWS: [(&str, &[&str]); 6] = [
 ];
 
 /// What a crate may use in its tests and benchmarks besides: the runtime's benchmarks play packages baked on the spot.
-const DEVELOPMENT_ARROWS: [(&str, &[&str]); 1] = [("sinew-runtime", &["sinew-bake", "sinew-synthesize"])];
+const DEVELOPMENT_ARROWS: [(&str, &[&str]); 1] = [("sinew-runtime", &["sinew-peers"])];
 
 /// Everything that the runtime links, all of it without std.
 const RUNTIME_CLOSURE: [&str; 18] = [
