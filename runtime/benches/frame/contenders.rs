@@ -1,6 +1,6 @@
 //! Who takes part: the runtime's frames, and what engines and solvers offer instead.
 
-use std::hint::black_box;
+use core::hint::black_box;
 
 use sinew_peers::morph::MorphTargets;
 use sinew_peers::skinning::Skin;

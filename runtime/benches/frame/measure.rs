@@ -1,6 +1,6 @@
 //! Measuring: rounds in which every contender takes its turn, CPU time of the thread, medians and tails.
 
-use std::hint::black_box;
+use core::hint::black_box;
 use std::time::Instant;
 
 use cpu_time::ThreadTime;
