@@ -183,3 +183,86 @@ impl Firmata {
         sink(KnobEvent { knob, reading });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::Reading;
+    use std::vec::Vec;
+
+    fn read(firmata: &mut Firmata, bytes: &[u8]) -> Vec<(u16, u16, u16)> {
+        let mut events = Vec::new();
+        firmata.feed(bytes, &mut |event: KnobEvent| match event.reading {
+            Reading::Position { value, full_scale } => events.push((event.knob, value, full_scale)),
+            Reading::Steps(_) => unreachable!("Firmata reports positions"),
+        });
+        events
+    }
+
+    #[test]
+    fn reports_behind_a_greeting() {
+        let mut firmata = Firmata::new(FullScale::Learned);
+        let greeting = b"\xf9\x02\x05\xf0\x79\x02\x05S\x00k\x00\xf7\x90\x04\x00";
+        assert_eq!(read(&mut firmata, greeting), []);
+        assert_eq!(firmata.counters().ignored, 3);
+        assert_eq!(
+            read(&mut firmata, b"\xe0\x00\x04\xe1\x7f\x07"),
+            [(0, 512, 1023), (1, 1023, 1023)]
+        );
+        assert_eq!((firmata.counters().good, firmata.counters().bad), (2, 0));
+    }
+
+    #[test]
+    fn extended_reports_reach_any_pin() {
+        let mut firmata = Firmata::new(FullScale::Fixed(65535));
+        assert_eq!(
+            read(&mut firmata, b"\xf0\x6f\x14\x7f\x7f\x03\xf7"),
+            [(20, 65535, 65535)]
+        );
+        for bad in [
+            &b"\xf0\x6f\xf7"[..],
+            b"\xf0\x6f\x14\xf7",
+            b"\xf0\x6f\x14\x7f\x7f\x04\xf7",
+            b"\xf0\x6f\x14\x01\x01\x01\x01\xf7",
+        ] {
+            let before = firmata.counters().bad;
+            assert_eq!(read(&mut firmata, bad), []);
+            assert_eq!(firmata.counters().bad, before + 1);
+            assert_eq!(firmata.counters().last_fault, Some(Fault::BadReport));
+        }
+        let long = [&b"\xf0\x71"[..], &[1; 70_000], b"\xf7\xe0\x01\x00"].concat();
+        assert_eq!(
+            read(&mut firmata, &long),
+            [(0, 1, 65535)],
+            "a sysex of any length is skipped"
+        );
+    }
+
+    #[test]
+    fn each_fault_is_named() {
+        for (bytes, fault) in [
+            (&b"\xe0\x01\x02\x03\xe0\x01\x00"[..], Fault::StrayData),
+            (b"\xe0\x01\xe0\x01\x00", Fault::CutMessage),
+            (b"\xf0\x79\xe0\x01\x00", Fault::CutMessage),
+        ] {
+            let mut firmata = Firmata::new(FullScale::Learned);
+            assert_eq!(read(&mut firmata, bytes).last(), Some(&(0, 1, 1023)));
+            assert_eq!(
+                (firmata.counters().bad, firmata.counters().last_fault),
+                (1, Some(fault))
+            );
+        }
+    }
+
+    #[test]
+    fn the_request_fits_or_says_so() {
+        let mut out = [0xaa; 10];
+        assert_eq!(write_firmata_request(2, 300, &mut out), Ok(9));
+        assert_eq!(out, *b"\xf0\x7a\x2c\x02\xf7\xc0\x01\xc1\x01\xaa");
+        let error = BufferTooSmall {
+            required_bytes: 37,
+            actual_bytes: 10,
+        };
+        assert_eq!(write_firmata_request(200, 0, &mut out), Err(error));
+    }
+}

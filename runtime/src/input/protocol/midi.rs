@@ -218,3 +218,144 @@ fn position(knob: u16, value: u16, full_scale: u16) -> KnobEvent {
         reading: Reading::Position { value, full_scale },
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::vec::Vec;
+
+    fn read(midi: &mut Midi, bytes: &[u8]) -> Vec<(u16, u16, u16)> {
+        let mut events = Vec::new();
+        midi.feed(bytes, &mut |event: KnobEvent| {
+            events.push(match event.reading {
+                Reading::Position { value, full_scale } => (event.knob, value, full_scale),
+                Reading::Steps(steps) => (event.knob, steps.cast_unsigned(), 0),
+            });
+        });
+        events
+    }
+
+    fn with(pairing: Pairing) -> Midi {
+        let mut settings = MidiSettings::new();
+        settings.pairing = pairing;
+        Midi::new(settings)
+    }
+
+    #[test]
+    fn messages_and_their_knobs() {
+        let mut midi = with(Pairing::Learned);
+        let bytes = b"\xb0\x07\x40\xb1\x07\x7f\xe2\x7f\x7f\x93\x05\x20\x93\x05\x00\x83\x06\x11";
+        let expected = [
+            (7, 64, 127),
+            (135, 127, 127),
+            (KNOB_PITCH_BEND + 2, 16383, 16383),
+            (KNOB_NOTE + 3 * 128 + 5, 127, 127),
+            (KNOB_NOTE + 3 * 128 + 5, 0, 127),
+            (KNOB_NOTE + 3 * 128 + 6, 0, 127),
+        ];
+        assert_eq!(read(&mut midi, bytes), expected);
+        assert_eq!((midi.counters().good, midi.counters().bad), (6, 0));
+    }
+
+    #[test]
+    fn running_status_and_real_time_inside_messages() {
+        let mut midi = with(Pairing::Learned);
+        assert_eq!(
+            read(&mut midi, b"\xb0\x46\xf8\x01\x46\x02\xfe\x47\xf8\x03"),
+            [(70, 1, 127), (70, 2, 127), (71, 3, 127)]
+        );
+        assert_eq!((midi.counters().ignored, midi.counters().bad), (3, 0));
+    }
+
+    #[test]
+    fn what_is_not_a_knob_is_ignored() {
+        let mut midi = with(Pairing::Learned);
+        // Sysex with a clock in it, song position, tune request, program change, pressures, all notes off.
+        let bytes = b"\xf0\x7e\x01\xf8\x02\xf7\xf2\x01\x02\xf6\xc0\x05\x06\xd0\x07\xa0\x01\x02\xb0\x7b\x00";
+        assert_eq!(read(&mut midi, bytes), []);
+        assert_eq!((midi.counters().ignored, midi.counters().bad), (9, 0));
+    }
+
+    #[test]
+    fn each_fault_is_named() {
+        for (bytes, fault) in [
+            (&b"\xf6\x01\xb0\x01\x02"[..], Fault::StrayData),
+            (b"\xb0\x01\xb0\x01\x02", Fault::CutMessage),
+            (b"\xf0\x01\xb0\x01\x02", Fault::CutMessage),
+            (b"\xf2\x01\xb0\x01\x02", Fault::CutMessage),
+        ] {
+            let mut midi = with(Pairing::Learned);
+            assert_eq!(read(&mut midi, bytes), [(1, 2, 127)]);
+            assert_eq!((midi.counters().bad, midi.counters().last_fault), (1, Some(fault)));
+        }
+        let mut midi = with(Pairing::Learned);
+        assert_eq!(read(&mut midi, b"\x05\x06\x07\xb0\x01\x02\xb0\x01"), [(1, 2, 127)]);
+        midi.reset();
+        assert_eq!(read(&mut midi, b"\x02\xb0\x01\x03"), [(1, 3, 127)]);
+        assert_eq!((midi.counters().bad, midi.counters().partial), (0, 3));
+    }
+
+    #[test]
+    fn no_half_of_a_pair_overshoots() {
+        for pairing in [Pairing::Learned, Pairing::Always] {
+            let mut midi = with(pairing);
+            let mut value: u16 = 0;
+            read(&mut midi, b"\xb0\x01\x00\x21\x00");
+            for step in [
+                1_i32, 127, 128, 129, -1, -128, 5000, -300, 9000, -16383, 16383, -2, -12345,
+            ] {
+                let next = (i32::from(value) + step).clamp(0, 16383) as u16;
+                let bytes = [0xb0, 1, (next >> 7) as u8, 0x21, (next & 0x7f) as u8];
+                let events = read(&mut midi, &bytes);
+                assert_eq!(events.len(), 2);
+                for (knob, between, full_scale) in &events {
+                    assert_eq!((*knob, *full_scale), (1, 16383));
+                    assert!(
+                        (value.min(next)..=value.max(next)).contains(between),
+                        "{value} {between} {next}"
+                    );
+                }
+                assert_eq!(events[1].1, next);
+                value = next;
+            }
+        }
+    }
+
+    #[test]
+    fn pairs_are_learned_and_knobs_of_their_own_are_left_alone() {
+        let mut midi = with(Pairing::Learned);
+        assert_eq!(read(&mut midi, b"\xb0\x21\x05"), [(33, 5, 127)], "33 alone is a knob");
+        assert_eq!(
+            read(&mut midi, b"\xb0\x01\x05\x21\x06"),
+            [(1, 5, 127), (33, 6, 127)],
+            "and stays one"
+        );
+        assert_eq!(
+            read(&mut midi, b"\xb1\x01\x05\x21\x06"),
+            [(129, 5, 127), (129, 646, 16383)]
+        );
+        assert_eq!(
+            read(&mut midi, b"\x21\x07"),
+            [(129, 647, 16383)],
+            "the lower half alone is a fine turn"
+        );
+        assert_eq!(
+            read(&mut midi, b"\xb2\x01\x05\xb2\x02\x09\x21\x06"),
+            [(257, 5, 127), (258, 9, 127), (289, 6, 127)]
+        );
+        let mut never = with(Pairing::Never);
+        assert_eq!(read(&mut never, b"\xb0\x01\x05\x21\x06"), [(1, 5, 127), (33, 6, 127)]);
+    }
+
+    #[test]
+    fn encoders_give_steps() {
+        let mut settings = MidiSettings::new();
+        settings.set_coding(1, Coding::TwosComplement);
+        let mut midi = Midi::new(settings);
+        assert_eq!(
+            read(&mut midi, b"\xb0\x01\x7f\x01\x02\x21\x03\x01\x00"),
+            [(1, (-1_i16).cast_unsigned(), 0), (1, 2, 0), (33, 3, 127)],
+            "an encoder has no lower half, and rest is no event"
+        );
+    }
+}

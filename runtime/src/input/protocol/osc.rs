@@ -266,3 +266,161 @@ fn string<'a>(rest: &mut &'a [u8]) -> Result<&'a [u8], Fault> {
     *rest = rest.get((length + 1).next_multiple_of(4)..).ok_or(Fault::OscCutShort)?;
     Ok(text)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::{vec, vec::Vec};
+
+    fn text(text: &str) -> Vec<u8> {
+        let mut bytes = text.as_bytes().to_vec();
+        bytes.resize((bytes.len() + 1).next_multiple_of(4), 0);
+        bytes
+    }
+
+    fn message(address: &str, types: &str, data: &[u8]) -> Vec<u8> {
+        [&text(address)[..], &text(types), data].concat()
+    }
+
+    fn float(address: &str, value: f32) -> Vec<u8> {
+        message(address, ",f", &value.to_be_bytes())
+    }
+
+    fn bundle(elements: &[Vec<u8>]) -> Vec<u8> {
+        let mut bytes = [BUNDLE, &[0, 0, 0, 0, 0, 0, 0, 1]].concat();
+        for element in elements {
+            bytes.extend((element.len() as u32).to_be_bytes());
+            bytes.extend(element);
+        }
+        bytes
+    }
+
+    fn read(osc: &mut Osc, packet: &[u8]) -> Vec<(u16, u16, u16)> {
+        let mut events = Vec::new();
+        osc.feed_packet(packet, &mut |event: KnobEvent| match event.reading {
+            Reading::Position { value, full_scale } => events.push((event.knob, value, full_scale)),
+            Reading::Steps(_) => unreachable!("OSC holds positions"),
+        });
+        events
+    }
+
+    #[test]
+    fn addresses_are_knobs() {
+        let mut osc = Osc::new(FullScale::Learned);
+        assert_eq!(read(&mut osc, &float("/jaw", 1.0)), [(0, 65535, 65535)]);
+        assert_eq!(read(&mut osc, &float("/brow", 0.0)), [(1, 0, 65535)]);
+        assert_eq!(read(&mut osc, &message("/i", ",i", &[0, 0, 0, 64])), [(2, 64, 127)]);
+        assert_eq!(read(&mut osc, &message("/on", ",TF", &[])), [(3, 1, 1), (4, 0, 1)]);
+        assert_eq!((osc.name_of(3), osc.name_of(4)), (Some("/on"), Some("/on#1")));
+        let vmc = message(
+            "/VMC/Ext/Blend/Val",
+            ",sf",
+            &[&text("Joy")[..], &0.5_f32.to_be_bytes()].concat(),
+        );
+        assert_eq!(read(&mut osc, &vmc), [(5, 32768, 65535)]);
+        assert_eq!(osc.name_of(5), Some("/VMC/Ext/Blend/Val/Joy"));
+        let all = [
+            &[0, 0, 0, 5, 1, 2, 3, 4, 5, 0, 0, 0][..],
+            &[0; 8],
+            &[0; 4],
+            &0.25_f64.to_be_bytes(),
+            &3_i64.to_be_bytes(),
+        ];
+        assert_eq!(
+            read(&mut osc, &message("/all", ",btc[N]Idh", &all.concat())),
+            [(6, 16384, 65535), (7, 3, 127)]
+        );
+        assert_eq!((osc.counters().good, osc.counters().bad), (6, 0));
+        assert_eq!(read(&mut osc, &message("/pose", ",fffffff", &[0; 28])), []);
+        assert_eq!(osc.counters().ignored, 1);
+    }
+
+    #[test]
+    fn values_outside_are_cut_and_counted() {
+        let mut osc = Osc::new(FullScale::Learned);
+        assert_eq!(read(&mut osc, &float("/a", -0.5)), [(0, 0, 65535)]);
+        assert_eq!(read(&mut osc, &float("/a", 7.0)), [(0, 65535, 65535)]);
+        assert_eq!(
+            read(&mut osc, &message("/b", ",i", &(-3_i32).to_be_bytes())),
+            [(1, 0, 127)]
+        );
+        assert_eq!(
+            (osc.counters().clamped, osc.counters().last_fault),
+            (3, Some(Fault::OutOfRange))
+        );
+    }
+
+    #[test]
+    fn bundles_nest_to_a_depth() {
+        let mut osc = Osc::new(FullScale::Learned);
+        let inner = bundle(&[float("/b", 1.0), b"bad.".to_vec(), float("/a", 0.0)]);
+        let events = read(&mut osc, &bundle(&[float("/a", 1.0), inner]));
+        assert_eq!(events, [(0, 65535, 65535), (1, 65535, 65535), (0, 0, 65535)]);
+        assert_eq!(
+            (osc.counters().bad, osc.counters().last_fault),
+            (1, Some(Fault::NotOsc))
+        );
+        let mut packet = float("/a", 1.0);
+        for depth in 1..=OSC_DEPTH_MAX + 1 {
+            packet = bundle(&[packet]);
+            let events = read(&mut osc, &packet);
+            assert_eq!(events.len(), usize::from(depth <= OSC_DEPTH_MAX));
+        }
+        assert_eq!(osc.counters().last_fault, Some(Fault::OscTooDeep));
+    }
+
+    #[test]
+    fn each_fault_is_named() {
+        let nan = float("/a", f32::NAN);
+        let whole = float("/a", 1.0);
+        let cases = [
+            (b"hello".to_vec(), Fault::NotOsc),
+            (Vec::new(), Fault::NotOsc),
+            (message("/\u{7}", ",f", &[0; 4]), Fault::OscBadAddress),
+            (text("/a"), Fault::OscBadTypes),
+            (message("/a", "f", &[0; 4]), Fault::OscBadTypes),
+            (message("/a", ",?", &[0; 4]), Fault::OscBadTypes),
+            (message("/a", ",f", &[0; 3]), Fault::OscCutShort),
+            (message("/a", ",f", &[0; 8]), Fault::OscCutShort),
+            (message("/a", ",b", &[0xff; 4]), Fault::OscCutShort),
+            (nan, Fault::NotFinite),
+            ([BUNDLE, &[0; 8], &[0, 0, 0, 99], &whole].concat(), Fault::OscCutShort),
+            ([BUNDLE, &[0; 7]].concat(), Fault::OscCutShort),
+        ];
+        for (packet, fault) in cases {
+            let mut osc = Osc::new(FullScale::Learned);
+            assert_eq!(read(&mut osc, &packet), [], "{fault}");
+            assert_eq!((osc.counters().bad, osc.counters().last_fault), (1, Some(fault)));
+        }
+        for end in 1..whole.len() {
+            let mut osc = Osc::new(FullScale::Learned);
+            assert_eq!(read(&mut osc, &whole[..end]), [], "{end}");
+            assert_eq!(osc.counters().bad, 1);
+        }
+    }
+
+    #[test]
+    fn slip_on_a_serial_line() {
+        let mut osc = Osc::new(FullScale::Learned);
+        let packet = float("/a", 1.0);
+        let long = vec![b'/'; 2000];
+        let stream = [
+            &packet[4..],
+            b"\xc0",
+            &packet,
+            b"\xc0",
+            b"\xdb\x01\xc0",
+            &long,
+            b"\xc0\xc0",
+            &packet,
+            b"\xc0",
+        ];
+        let mut event_count = 0;
+        osc.feed(&stream.concat(), &mut |_| event_count += 1);
+        let counters = osc.counters();
+        assert_eq!(
+            (event_count, counters.partial, counters.bad, counters.dropped),
+            (2, 1, 2, 1)
+        );
+    }
+}
