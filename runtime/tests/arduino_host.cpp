@@ -21,6 +21,16 @@ class Stream {
 
 #include "SinewKnobs.h"
 
+// What the example sketch needs of an Arduino.
+static class : public Stream {
+ public:
+  void begin(unsigned long) {}
+} Serial;
+enum { A0, A1, A2, A3, A4, A5, A6, A7 };
+static uint16_t analogRead(uint8_t pin) { return (uint16_t)(100 * pin); }
+static void delay(unsigned long) {}
+#include "examples/EightKnobs/EightKnobs.ino"
+
 static void title(const char *text) { std::printf("\n%s ", text); }
 
 int main() {
@@ -55,5 +65,8 @@ int main() {
   SinewKnobs<1> one(port, "", 1);
   one.begin();
   for (int i = 0; i < 600; ++i) one.update();
+  title("sketch");
+  setup();
+  loop();
   std::printf("\n");
 }

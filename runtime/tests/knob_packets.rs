@@ -206,4 +206,17 @@ fn the_arduino_header_sends_the_vectors() {
         600 + 3,
         "one introduction at the start and one after each 256 updates"
     );
+
+    let mut packets = Packets::new();
+    let mut text = String::new();
+    packets.feed(&sent["sketch"], &mut |event| {
+        writeln!(text, "{}", event_line(event)).unwrap()
+    });
+    let expected: String = (0..8).map(|k| format!("event {k} {}/1023\n", k * 100)).collect();
+    assert_eq!(text, expected);
+    assert_eq!(
+        (packets.firmware(), packets.name_of(1)),
+        (Some("EightKnobs 1.0"), Some("brow left"))
+    );
+    assert_eq!(packets.counters().bad, 0);
 }

@@ -12,7 +12,7 @@ void setup() {
   knobs.name(0, "jaw");
   knobs.name(1, "brow left");
   knobs.name(2, "brow right");
-  knobs.range(0, 12, 1010);  // what this pot really reaches; leave it out if you do not know
+  knobs.range(0, 12, 1010);  // what this pot really reaches; leave it out if you do not know it
   knobs.begin();
 }
 
