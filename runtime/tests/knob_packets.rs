@@ -1,7 +1,8 @@
 //! The framed protocol of `docs/knob-protocol.md`: the conformance vectors against the parser, and the Arduino header
 //! against the vectors.
 
-use std::{collections::BTreeMap, fmt::Write, fs, path::PathBuf, process::Command};
+use core::fmt::Write;
+use std::{collections::BTreeMap, fs, path::PathBuf, process::Command};
 
 use sinew_runtime::input::{
     KnobEvent, Reading,

@@ -158,7 +158,7 @@ impl fmt::Display for Fault {
             Self::WrongLength => "a frame has not the length that its counts ask for",
             Self::ValueAboveFullScale => "a frame holds a value above its own full scale",
             Self::BadName => "a frame holds a name that is no text",
-            Self::SequenceGap { missing } => return write!(out, "{missing} frames are missing"),
+            Self::SequenceGap { missing } => return write!(out, "frames are missing: {missing}"),
             Self::StrayData => "data bytes belong to no message",
             Self::CutMessage => "a message was broken off by another",
             Self::BadReport => "an extended analog report has the wrong form",

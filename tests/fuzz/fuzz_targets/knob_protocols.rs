@@ -46,6 +46,11 @@ fuzz_target!(|data: &[u8]| {
         for knob in [0, 63, 64, u16::MAX] {
             let _ = (whole.name_of(knob), whole.range_of(knob));
         }
-        let _ = (whole.firmware(), whole.knob_count(), whole.confidence(), whole.recognition().to_string());
+        let _ = (
+            whole.firmware(),
+            whole.knob_count(),
+            whole.confidence(),
+            whole.recognition().to_string(),
+        );
     }
 });

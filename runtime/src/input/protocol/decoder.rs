@@ -87,7 +87,7 @@ impl Parser {
     }
 }
 
-/// Turns the bytes of one device into events. About five kilobytes, no heap; making one clears them and does no more.
+/// Turns the bytes of one device into events. Under five kilobytes, no heap; making one clears them and does no more.
 ///
 /// ```
 /// use sinew_runtime::input::{Decoder, Protocol, Settings};
@@ -206,6 +206,9 @@ impl Decoder {
             Parser::Sniffing(sniffer, counters) => {
                 counters.partial += u64::from(!sniffer.waiting().is_empty());
                 sniffer.clear();
+                if !sniffer.undecided {
+                    self.recognition = Recognition::Listening { waiting_bytes: 0 };
+                }
             }
             Parser::Lines(lines) => lines.reset(),
             Parser::Packets(packets) => packets.reset(),

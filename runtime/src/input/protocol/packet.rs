@@ -68,6 +68,8 @@ pub struct Packets {
     in_step: bool,
     /// Sequence number that comes next.
     expected: Option<u8>,
+    /// Frames refused since the last one whose checksum held: they leave a gap too, and are counted already.
+    refused: u8,
     knob_count: Option<u8>,
     ranges: [Option<(u16, u16)>; NAMES_MAX],
     firmware: [u8; FIRMWARE_BYTES_MAX],
@@ -87,6 +89,7 @@ impl Packets {
             pending: false,
             in_step: false,
             expected: None,
+            refused: 0,
             knob_count: None,
             ranges: [None; NAMES_MAX],
             firmware: [0; FIRMWARE_BYTES_MAX],
@@ -119,7 +122,7 @@ impl Packets {
     pub fn reset(&mut self) {
         self.counters.partial += u64::from(self.pending);
         self.clear_frame();
-        (self.in_step, self.expected) = (false, None);
+        (self.in_step, self.expected, self.refused) = (false, None, 0);
     }
 
     /// Totals so far.
@@ -182,8 +185,13 @@ impl Packets {
             }
             // The first frame after opening may be cut; a checksum says so, and a line has none.
             Err(_) if !in_step => self.counters.partial += 1,
-            Err(Fault::FrameTooLong) => self.counters.overflow(Fault::FrameTooLong),
-            Err(fault) => self.counters.refuse(fault),
+            Err(fault) => {
+                self.refused = self.refused.saturating_add(1);
+                match fault {
+                    Fault::FrameTooLong => self.counters.overflow(fault),
+                    _ => self.counters.refuse(fault),
+                }
+            }
         }
     }
 
@@ -197,7 +205,8 @@ impl Packets {
         }
         let kind = FrameKind::of(*kind);
         let started = kind == Some(FrameKind::Hello) && payload.first().is_some_and(|flags| flags & FLAG_STARTED != 0);
-        let missing = self.expected.map_or(0, |expected| sequence.wrapping_sub(expected));
+        let gap = self.expected.map_or(0, |expected| sequence.wrapping_sub(expected));
+        let missing = gap.saturating_sub(core::mem::take(&mut self.refused));
         self.expected = Some(sequence.wrapping_add(1));
         if missing != 0 && !started {
             self.counters.dropped += u64::from(missing);
