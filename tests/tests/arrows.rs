@@ -7,7 +7,7 @@ use serde_json::Value;
 use sinew_tests::workspace_folder;
 
 /// `(crate, what it may depend on)`, within the workspace.
-const ARROWS: [(&str, &[&str]); 7] = [
+const ARROWS: &[(&str, &[&str])] = &[
     ("sinew-formats", &[]),
     ("sinew-runtime", &["sinew-formats"]),
     ("sinew-bake", &["sinew-formats"]),
@@ -21,17 +21,21 @@ const ARROWS: [(&str, &[&str]); 7] = [
 ];
 
 /// What a crate may use in its tests and benchmarks besides: the runtime's benchmarks play packages baked on the spot.
-const DEVELOPMENT_ARROWS: [(&str, &[&str]); 1] = [("sinew-runtime", &["sinew-peers"])];
+const DEVELOPMENT_ARROWS: &[(&str, &[&str])] = &[("sinew-runtime", &["sinew-peers"])];
 
 /// Everything that the runtime links, all of it without std.
-const RUNTIME_CLOSURE: [&str; 18] = [
+const RUNTIME_CLOSURE: &[&str] = &[
     "bytecheck",
     "bytemuck",
+    "byteorder",
     "cfg-if",
     "cpufeatures",
+    "cobs",
     "crc",
     "crc-catalog",
     "half",
+    "hash32",
+    "heapless",
     "libm",
     "munge",
     "ptr_meta",
@@ -41,6 +45,8 @@ const RUNTIME_CLOSURE: [&str; 18] = [
     "simdutf8",
     "sinew-formats",
     "sinew-runtime",
+    "stable_deref_trait",
+    "thiserror",
     "xxhash-rust",
     "zerocopy",
 ];
