@@ -3,10 +3,10 @@
 "use strict";
 
 class Sinew {
-  // Makes a module from its bytes (ArrayBuffer or typed array). One instance plays one package at a time.
-  static async load(wasmBytes) {
-    const { instance } = await WebAssembly.instantiate(wasmBytes, {});
-    return new Sinew(instance.exports);
+  // From the bytes of sinew.wasm, or from a module compiled before. Each instance plays one package at a time.
+  static async load(source) {
+    const module = source instanceof WebAssembly.Module ? source : await WebAssembly.compile(source);
+    return new Sinew((await WebAssembly.instantiate(module, {})).exports);
   }
 
   constructor(exports) {
