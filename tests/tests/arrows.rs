@@ -15,13 +15,17 @@ const ARROWS: [(&str, &[&str]); 4] = [
 ];
 
 /// Everything that the runtime links, all of it without std.
-const RUNTIME_CLOSURE: [&str; 17] = [
+const RUNTIME_CLOSURE: [&str; 23] = [
     "bytecheck",
     "bytemuck",
+    "byteorder",
     "cfg-if",
+    "cobs",
     "crc",
     "crc-catalog",
     "half",
+    "hash32",
+    "heapless",
     "libm",
     "munge",
     "ptr_meta",
@@ -31,6 +35,8 @@ const RUNTIME_CLOSURE: [&str; 17] = [
     "simdutf8",
     "sinew-formats",
     "sinew-runtime",
+    "stable_deref_trait",
+    "thiserror",
     "xxhash-rust",
     "zerocopy",
 ];

@@ -2,6 +2,10 @@
 //!
 //! Path of data: bytes in any chunking -> protocol -> [`KnobEvent`] -> calibration, filter, takeover, map -> [`crate::Controls`].
 
+mod counters;
 mod event;
+pub mod protocol;
 
+pub use counters::{Counters, Fault};
 pub use event::{KnobEvent, Reading};
+pub use protocol::{Decoder, Finding, FullScale, Protocol, Settings};
