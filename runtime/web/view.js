@@ -4,7 +4,7 @@
 const VERTEX_SHADER = `#version 300 es
 in vec3 position, normal, rest;
 uniform mat4 clipFromModel;
-uniform float farthest;
+uniform float farthest, wire;
 out vec3 shadingNormal, modelPosition;
 out float displacement;
 void main() {
@@ -12,6 +12,7 @@ void main() {
   modelPosition = position;
   displacement = clamp(distance(position, rest) / farthest, 0.0, 1.0);
   gl_Position = clipFromModel * vec4(position, 1.0);
+  gl_Position.z -= 0.0008 * wire * gl_Position.w; // lines before their own faces
 }`;
 
 const FRAGMENT_SHADER = `#version 300 es
@@ -40,7 +41,7 @@ void main() {
 const CLAY = [0.5, 0.49, 0.47];
 const HOT = [0.95, 0.16, 0.03];
 // Distance from rest that is fully coloured, as a share of the mesh's radius.
-const HOT_AT = 0.35;
+const HOT_AT = 0.2;
 const FIELD_OF_VIEW = (35 * Math.PI) / 180;
 const PITCH_LIMIT = 1.55;
 
@@ -102,7 +103,7 @@ class MeshView {
   // Looks at the whole mesh from ahead and a little above.
   frameMesh(centre = this.centre, radius = this.radius) {
     Object.assign(this, { centre, radius, target: [...centre], yaw: 0.6, pitch: 0.3 });
-    this.distance = (1.15 * radius) / Math.sin(0.5 * FIELD_OF_VIEW);
+    this.distance = (0.95 * radius) / Math.sin(0.5 * FIELD_OF_VIEW);
     this.onChange();
   }
 
@@ -169,9 +170,6 @@ class MeshView {
     this.wireIndices = gl.createBuffer();
     gl.enable(gl.DEPTH_TEST);
     gl.depthFunc(gl.LEQUAL);
-    // Faces a little behind their own lines.
-    gl.enable(gl.POLYGON_OFFSET_FILL);
-    gl.polygonOffset(1, 1);
   }
 
   // Every edge once.
@@ -211,8 +209,10 @@ class MeshView {
     // A narrow window shows the whole width instead of the whole height.
     const scale = 1 / Math.tan(0.5 * FIELD_OF_VIEW);
     const [sx, sy] = aspect < 1 ? [scale, scale * aspect] : [scale / aspect, scale];
-    const near = Math.max(this.distance - 4 * this.radius, 0.01 * this.radius);
-    const far = this.distance + 8 * this.radius;
+    // Room for a mesh that moves out of its rest sphere, and near planes far enough for a precise depth.
+    const distance = Math.hypot(...subtract(eye, this.centre));
+    const near = Math.max(distance - 3 * this.radius, 0.02 * this.radius);
+    const far = distance + 4 * this.radius;
     const [a, b] = [(far + near) / (near - far), (2 * far * near) / (near - far)];
     const columns = [0, 1, 2].map((c) => [sx * right[c], sy * up[c], a * back[c], -back[c]]);
     const last = [-sx * dot(right, eye), -sy * dot(up, eye), -a * dot(back, eye) + b, dot(back, eye)];

@@ -1,13 +1,13 @@
 //! Sinew on a bare Cortex-M7: no operating system, no allocator, no std.
 //!
 //! Path of data: bytes of a knob box on UART 0 -> lines of positions from 0 to 1023 joined by `|` -> weights -> frame ->
-//! one line back: the checksum over positions and normals of all frames so far. A line that is none is answered with
-//! `refused` and a reason and moves nothing. The byte 4 (end of transmission) ends the program by way of the debugger
-//! (semihosting), which QEMU understands. The package comes in at compile time, from the path in `SINEW_EMBEDDED_PACKAGE`.
+//! one line back: the checksum over positions and normals of all frames so far. The first line is thrown away, for it may
+//! be cut; a line that is none is answered with `refused` and a reason and moves nothing. The byte 4 (end of transmission)
+//! ends the program by way of the debugger (semihosting), which QEMU understands. The package comes in at compile time,
+//! from the path in `SINEW_EMBEDDED_PACKAGE`.
 #![no_std]
 #![no_main]
 
-mod line;
 mod uart;
 
 use core::fmt::{self, Write};
@@ -15,10 +15,11 @@ use core::panic::PanicInfo;
 
 use cortex_m_rt::entry;
 use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
-use sinew_checksum::{Checksum, weight};
+use sinew_checksum::{Checksum, FULL_SCALE, weight};
+use sinew_runtime::input::protocol::Lines;
+use sinew_runtime::input::{FullScale, KnobEvent, Reading};
 use sinew_runtime::{Basis, ControlError, Controls, Frame, FrameError, OpenError, Workspace, WorkspaceError};
 
-use line::Line;
 use uart::Uart;
 
 /// Where a package may lie.
@@ -77,34 +78,47 @@ fn perform(
     let mut controls = Controls::new(&basis, &mut weights[..component_count]).map_err(Failure::Controls)?;
     let (positions, normals) = (&mut positions[..vertex_count], &mut normals[..vertex_count]);
     let mut checksum = Checksum::START;
-    let mut line = Line::new();
+    let mut lines = Lines::new(FullScale::Fixed(FULL_SCALE));
     loop {
         let byte = uart.receive();
         if byte == END_OF_TRANSMISSION {
             return Ok(());
         }
-        let answer = match line.push(byte) {
-            None => continue,
-            Some(Ok(knobs)) => {
-                for (k, &knob) in knobs.iter().take(component_count).enumerate() {
-                    let wanted = weight(&basis.component(k), knob);
-                    controls.set(k, wanted).map_err(Failure::Controls)?;
-                }
-                let job = Frame {
-                    basis: &basis,
-                    controls: &controls,
-                    positions,
-                    normals: Some(normals),
-                };
-                job.run(&mut workspace).map_err(Failure::Frame)?;
-                checksum = checksum.with(positions).with(normals);
-                writeln!(uart, "{checksum}")
-            }
-            Some(Err(reason)) => writeln!(uart, "refused: {reason}"),
+        let (good, bad) = (lines.counters().good, lines.counters().bad);
+        let mut taken = Ok(());
+        lines.feed(&[byte], &mut |event| {
+            taken = taken.and_then(|()| turn(&mut controls, event))
+        });
+        taken.map_err(Failure::Controls)?;
+        let answered = if lines.counters().good > good {
+            let job = Frame {
+                basis: &basis,
+                controls: &controls,
+                positions,
+                normals: Some(normals),
+            };
+            job.run(&mut workspace).map_err(Failure::Frame)?;
+            checksum = checksum.with(positions).with(normals);
+            writeln!(uart, "{checksum}")
+        } else if let Some(fault) = lines.counters().last_fault.filter(|_| lines.counters().bad > bad) {
+            writeln!(uart, "refused: {fault}")
+        } else {
+            Ok(())
         };
         // The UART's writer never fails.
-        let _ = answer;
+        let _ = answered;
     }
+}
+
+/// The knob of a column moves the component of that number; knobs beyond the components move nothing.
+fn turn(controls: &mut Controls<'_>, event: KnobEvent) -> Result<(), ControlError> {
+    let k = usize::from(event.knob);
+    if let Reading::Position { value, .. } = event.reading
+        && k < controls.basis().component_count()
+    {
+        controls.set(k, weight(&controls.basis().component(k), value))?;
+    }
+    Ok(())
 }
 
 /// Why the program ended before its input did.

@@ -1,6 +1,6 @@
 //! The host's side of the comparison between targets: writes what the others play into a folder, and prints the
-//! checksum that they must reach. `tiny.sinew` is the hand-made baked package; `poses.txt` holds the fixed poses in the
-//! line protocol of a knob box, one pose a line.
+//! checksum that they must reach. `played.sinew` is the baked package that was given, or else the hand-made one;
+//! `poses.txt` holds the fixed poses in the line protocol of a knob box, one pose a line.
 
 use core::error::Error;
 use core::fmt::Write as _;
@@ -8,12 +8,15 @@ use std::path::PathBuf;
 use std::{env, fs};
 
 use sinew_checksum::{POSE_COUNT, knobs, play};
-use sinew_formats::package::{fixture::tiny_baked, write_baked};
+use sinew_formats::package::{AlignedBytes, fixture::tiny_baked, write_baked};
 use sinew_runtime::{Basis, Controls, Workspace, WorkspaceLayout};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let folder = PathBuf::from(env::args_os().nth(1).ok_or("usage: reference FOLDER")?);
-    let bytes = write_baked(&tiny_baked().basis())?;
+    let folder = PathBuf::from(env::args_os().nth(1).ok_or("usage: reference FOLDER [PACKAGE]")?);
+    let bytes = match env::args_os().nth(2) {
+        Some(package) => AlignedBytes::from_slice(&fs::read(package)?),
+        None => write_baked(&tiny_baked().basis())?,
+    };
     let basis = Basis::open(&bytes)?;
     let (vertex_count, component_count) = (basis.vertex_count(), basis.component_count());
 
@@ -25,7 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         poses.push('\n');
     }
     fs::create_dir_all(&folder)?;
-    fs::write(folder.join("tiny.sinew"), &bytes[..])?;
+    fs::write(folder.join("played.sinew"), &bytes[..])?;
     fs::write(folder.join("poses.txt"), poses)?;
 
     let mut memory = vec![0; WorkspaceLayout::for_basis(&basis).unaligned_bytes()];
