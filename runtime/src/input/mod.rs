@@ -2,6 +2,18 @@
 //!
 //! Path of data: bytes in any chunking -> protocol -> [`KnobEvent`] -> calibration, filter, takeover, map -> [`crate::Controls`].
 
+mod calibrate;
 mod event;
+mod filter;
+mod response;
+mod supply;
+mod takeover;
 
+pub use calibrate::{
+    CalibrationRefusal, CalibrationSettings, Calibrator, KnobCalibration, KnobProgress, KnobTrial, Progress,
+};
 pub use event::{KnobEvent, Reading};
+pub use filter::{Deadband, OneEuro, REST_DISTANCE, Smoothing};
+pub use response::{Centre, Curve, ResolvedResponse, Response, ResponseFault};
+pub use supply::{Supply, Witness};
+pub use takeover::{Direction, Takeover, TakeoverState};
