@@ -19,6 +19,11 @@ impl Deadband {
         Self { held: position }
     }
 
+    /// The position held.
+    pub fn position(&self) -> f32 {
+        self.held
+    }
+
     /// Takes a position and returns the one to use: within `band` of it, and **exactly** on 0, 1 and, if `centred`, 0.5
     /// where the position is exactly there. Range: both in `[0, 1]`.
     pub fn update(&mut self, position: f32, band: f32, centred: bool) -> f32 {
