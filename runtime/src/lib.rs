@@ -37,6 +37,7 @@ mod normals;
 mod reconstruct;
 mod simd;
 mod solve;
+pub mod take;
 mod workspace;
 
 #[cfg(test)]

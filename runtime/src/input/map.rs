@@ -353,6 +353,11 @@ impl<'m> ControlMap<'m> {
         Ok(())
     }
 
+    /// The basis it was checked against.
+    pub fn basis(&self) -> &Basis<'m> {
+        &self.basis
+    }
+
     /// Pages of the bindings, at least 1.
     pub fn page_count(&self) -> u16 {
         self.page_count
