@@ -41,6 +41,16 @@ impl KnobCalibration {
         }
     }
 
+    /// The same knob where the supply may fall to `supply` of what it was in calibration: its upper stop counts as reached that
+    /// much earlier. For slow sags, which cannot be told from a hand; fast ones are corrected
+    /// ([`super::SurfaceSettings::follow_supply`]). Range: `(0, 1]`; a supply that leaves no range changes nothing.
+    #[must_use]
+    pub fn widened(self, supply: f32) -> Self {
+        let highest = libm::roundf(f32::from(self.highest) * supply.clamp(0.0, 1.0)) as u16;
+        let widened = Self { highest, ..self };
+        if widened.is_valid() { widened } else { self }
+    }
+
     /// Whether stops, centre and noise leave a range to turn in: both halves of it, if there is a centre, outside the flats.
     pub fn is_valid(&self) -> bool {
         let [low, high] = self.stops();
@@ -142,6 +152,18 @@ mod tests {
             let given_up = 2.0 * STOP_MARGIN + if calibration.centre.is_some() { 0.04 } else { 0.0 };
             let most = given_up * calibration.range() + 2.0 * f32::from(calibration.noise) + 2.0;
             assert!(flat as f32 <= most, "{calibration:?} wastes {flat} steps of {most}");
+        }
+    }
+
+    #[test]
+    fn a_widened_range_reaches_its_end_on_a_weak_supply() {
+        // deej issue 16: 4.6 V on the rail, and the slider stops at 80 %.
+        let widened = POT.widened(0.8);
+        assert_eq!(widened.position(0.8 * 818.0), 1.0);
+        assert_eq!(widened.position(7.0), 0.0);
+        assert!(POT.position(0.8 * 818.0) < 0.82);
+        for useless in [0.0, -1.0, f32::NAN] {
+            assert_eq!(POT.widened(useless), POT);
         }
     }
 
