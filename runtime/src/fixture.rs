@@ -167,10 +167,16 @@ impl Package {
 
     /// A 6 by 5 grid; a root block of two components, child blocks of one and of two under them.
     pub(crate) fn small(seed: u64) -> Self {
-        Self::on(&Grid::new(6, 5), seed)
+        Self::on(&Grid::new(6, 5), seed, [7; 16], |k| format!("c{k}"))
     }
 
-    fn on(grid: &Grid, seed: u64) -> Self {
+    /// What a second training might give: another identity, the names in another order, `c0` gone.
+    pub(crate) fn retrained(seed: u64) -> Self {
+        let names = ["c3", "c4", "new", "c1", "c2"];
+        Self::on(&Grid::new(6, 5), seed, [8; 16], |k| names[k].into())
+    }
+
+    fn on(grid: &Grid, seed: u64, compact_id: [u8; 16], name: impl Fn(usize) -> String) -> Self {
         let mut noise = Noise::new(seed);
         let count = grid.vertex_count() as u32;
         let mut vertex_from_solver = vec![0; count as usize];
@@ -184,7 +190,7 @@ impl Package {
         ];
         let (mut blocks, mut components) = (Vec::new(), Vec::new());
         let (mut support, mut slots, mut values) = (Vec::new(), Vec::new(), Vec::new());
-        let names: Vec<String> = (0..Self::COMPONENTS).map(|k| format!("c{k}")).collect();
+        let names: Vec<String> = (0..Self::COMPONENTS).map(name).collect();
         for (b, (parent, component_count)) in [(NONE, 2), (0, 1), (1, 2)].into_iter().enumerate() {
             blocks.push(BakedBlock {
                 level: u32::from(b > 0),
@@ -218,7 +224,7 @@ impl Package {
         }
         let factor = factorise(&grid.laplacian());
         let bytes = write_baked(&BakedBasis {
-            compact_id: [7; 16],
+            compact_id,
             rest_positions: &grid.rest,
             faces: &grid.faces,
             solver_from_vertex: &grid.solver_from_vertex,

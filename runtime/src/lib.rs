@@ -38,6 +38,7 @@ mod normals;
 mod reconstruct;
 mod simd;
 mod solve;
+pub mod take;
 mod workspace;
 
 #[cfg(test)]
