@@ -1,5 +1,5 @@
-//! Which crate may know which: formats <- runtime, formats and runtime <- trainer, all <- tests; and what the runtime
-//! may pull in. An arrow not listed here is a change of architecture.
+//! Which crate may know which: formats <- runtime, formats and runtime <- capi and trainer, all <- tests; and what the
+//! runtime may pull in. An arrow not listed here is a change of architecture.
 
 use std::{collections::BTreeSet, process::Command};
 
@@ -7,11 +7,15 @@ use serde_json::Value;
 use sinew_tests::workspace_folder;
 
 /// `(crate, what it may depend on)`, within the workspace.
-const ARROWS: [(&str, &[&str]); 4] = [
+const ARROWS: [(&str, &[&str]); 5] = [
     ("sinew-formats", &[]),
     ("sinew-runtime", &["sinew-formats"]),
+    ("sinew-capi", &["sinew-formats", "sinew-runtime"]),
     ("sinew-trainer", &["sinew-formats", "sinew-runtime"]),
-    ("sinew-tests", &["sinew-formats", "sinew-runtime", "sinew-trainer"]),
+    (
+        "sinew-tests",
+        &["sinew-formats", "sinew-runtime", "sinew-capi", "sinew-trainer"],
+    ),
 ];
 
 /// Everything that the runtime links, all of it without std.
