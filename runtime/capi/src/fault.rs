@@ -220,7 +220,7 @@ impl fmt::Display for Fault {
                 "the program was compiled with a header of interface version {actual}, the library has {expected}"
             ),
             Self::NotAHandle { name } => write!(out, "`{name}` is no handle, or its memory was freed or written over"),
-            Self::WrongHandle { name, found } => write!(out, "`{name}` is a handle of a {}", found.name()),
+            Self::WrongHandle { name, found } => write!(out, "`{name}` is a {} handle", found.name()),
             Self::ClosedHandle { name } => write!(out, "`{name}` is closed"),
             Self::MovedHandle { name } => write!(out, "`{name}` was copied or moved; a handle stays where it was made"),
             Self::DamagedHandle { name } => write!(out, "something wrote over the memory of `{name}`"),

@@ -1,13 +1,17 @@
 //! What the tests of the C interface share: the libraries as users build them, compilers, packages.
 #![allow(dead_code, reason = "each test program uses its own part")]
 
+pub mod player;
+
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-use sinew_formats::package::{AlignedBytes, fixture::tiny_baked, write_baked};
+use sinew_formats::package::{
+    AlignedBytes, fixture::tiny_baked, fixture::tiny_compact, limits, write_baked, write_compact,
+};
 
 pub fn crate_folder() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -18,10 +22,18 @@ pub fn package() -> AlignedBytes {
     write_baked(&tiny_baked().basis()).expect("the fixture is valid")
 }
 
-/// One of the same shape with another rest mesh.
+/// The compact package it comes from.
+pub fn compact_package() -> AlignedBytes {
+    write_compact(&tiny_compact().basis()).expect("the fixture is valid")
+}
+
+/// One of the same shape with another rest mesh, and values so large that large weights overflow.
 pub fn other_package() -> AlignedBytes {
     let mut baked = tiny_baked();
     baked.rest_positions[0][2] += 0.25;
+    for component in &mut baked.components {
+        component.value_scale = limits::VALUE_SCALE;
+    }
     write_baked(&baked.basis()).expect("the fixture is valid")
 }
 
