@@ -119,7 +119,10 @@ mod tests {
         let package = Package::small(1);
         let basis = open(&package);
         let mut memory = [f32::NAN; Package::COMPONENTS];
-        Controls::new(&basis, &mut memory).unwrap().set_unclamped(2, 7.0).unwrap();
+        Controls::new(&basis, &mut memory)
+            .unwrap()
+            .set_unclamped(2, 7.0)
+            .unwrap();
         assert_eq!(
             Controls::resume(&basis, &mut memory).unwrap().weights(),
             [0.0, 0.0, 7.0, 0.0, 0.0]

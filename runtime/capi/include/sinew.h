@@ -26,7 +26,7 @@
  *   Every call returns a status. Unless the status says otherwise, a call that does not return SINEW_STATUS_OK has
  *   changed nothing, results included. "Errors" lists the statuses without SINEW_STATUS_; every function that takes
  *   pointers also returns NULL_POINTER, MISALIGNED and, for a defect of the library, INTERNAL. "Those of a handle" are
- *   NOT_A_HANDLE, WRONG_HANDLE, CLOSED_HANDLE, MOVED_HANDLE, DAMAGED_HANDLE.
+ *   NOT_A_HANDLE, WRONG_HANDLE, CLOSED_HANDLE, MOVED_HANDLE, DAMAGED_HANDLE and IN_USE.
  *
  * Threads
  *   There is no global state. A basis serves any number of threads; a workspace or controls handle one call at a time. A
@@ -531,8 +531,7 @@ SinewStatus sinew_basis_open(uint32_t abi_version,
  * Ends a basis: later calls with it are refused with `CLOSED_HANDLE` while its memory stands. There is nothing to free, so
  * this is optional before memory and package are given back.
  *
- * Errors: `IN_USE`, and those of a handle: `NULL_POINTER`, `MISALIGNED`, `NOT_A_HANDLE`, `WRONG_HANDLE`, `CLOSED_HANDLE`,
- * `MOVED_HANDLE`, `DAMAGED_HANDLE`.
+ * Errors: those of a handle.
  * Threads: any, when no other uses the basis; one that does at this moment is noticed.
  *
  * # Safety
@@ -661,7 +660,7 @@ SinewStatus sinew_workspace_create(const struct SinewBasis *basis,
  * Ends a workspace: later calls with it are refused with `CLOSED_HANDLE` while its memory stands. There is nothing to
  * free, so this is optional before the memory is given back.
  *
- * Errors: those of a handle; `IN_USE`.
+ * Errors: those of a handle.
  * Threads: one at a time for each workspace; another one's use at this moment is noticed.
  *
  * # Safety
@@ -704,7 +703,7 @@ SinewStatus sinew_controls_create(const struct SinewBasis *basis,
  * Ends controls: later calls with them are refused with `CLOSED_HANDLE` while their memory stands. There is nothing to
  * free, so this is optional before the memory is given back.
  *
- * Errors: those of a handle; `IN_USE`.
+ * Errors: those of a handle.
  * Threads: one at a time for each controls handle; another one's use at this moment is noticed.
  *
  * # Safety
@@ -718,7 +717,7 @@ SinewStatus sinew_controls_close(struct SinewControls *controls);
  *
  * `taken`: NULL, or takes the weight after clamping.
  *
- * Errors: those of a handle; `IN_USE`, `NO_SUCH_CONTROL`, `NOT_FINITE`, `OVERLAP`.
+ * Errors: those of a handle; `NO_SUCH_CONTROL`, `NOT_FINITE`, `OVERLAP`.
  * Threads: one at a time for each controls handle; another one's use at this moment is noticed.
  *
  * # Safety
@@ -732,7 +731,7 @@ SinewStatus sinew_control_set(struct SinewControls *controls,
 /**
  * Sets a control beyond its stops, where a pose may leave what was seen in training.
  *
- * Errors: those of a handle; `IN_USE`, `NO_SUCH_CONTROL`, `NOT_FINITE`.
+ * Errors: those of a handle; `NO_SUCH_CONTROL`, `NOT_FINITE`.
  * Threads: one at a time for each controls handle; another one's use at this moment is noticed.
  *
  * # Safety
@@ -745,7 +744,7 @@ SinewStatus sinew_control_set_unclamped(struct SinewControls *controls,
 /**
  * The weight of a control.
  *
- * Errors: those of a handle; `IN_USE`, `NO_SUCH_CONTROL`, `OVERLAP`.
+ * Errors: those of a handle; `NO_SUCH_CONTROL`, `OVERLAP`.
  * Threads: one at a time for each controls handle; another one's use at this moment is noticed.
  *
  * # Safety
@@ -761,7 +760,7 @@ SinewStatus sinew_control_get(const struct SinewControls *controls,
  * `weights`, `weight_count`: exactly K.
  * `details`: NULL, or takes the numbers behind a refusal.
  *
- * Errors: those of a handle; `IN_USE`, `TOO_SHORT`, `NO_SUCH_CONTROL` (more than K), `NOT_FINITE` (none is set),
+ * Errors: those of a handle; `TOO_SHORT`, `NO_SUCH_CONTROL` (more than K), `NOT_FINITE` (none is set),
  * `OVERLAP`, `STRUCT_SIZE`.
  * Threads: one at a time for each controls handle; another one's use at this moment is noticed.
  *
@@ -778,7 +777,7 @@ SinewStatus sinew_controls_set_all(struct SinewControls *controls,
  *
  * `weights`, `weight_count`: at least K; more stay untouched.
  *
- * Errors: those of a handle; `IN_USE`, `TOO_SHORT`, `TOO_LONG`, `OVERLAP`.
+ * Errors: those of a handle; `TOO_SHORT`, `TOO_LONG`, `OVERLAP`.
  * Threads: one at a time for each controls handle; another one's use at this moment is noticed.
  *
  * # Safety
@@ -791,7 +790,7 @@ SinewStatus sinew_controls_get_all(const struct SinewControls *controls,
 /**
  * All controls to rest.
  *
- * Errors: those of a handle; `IN_USE`.
+ * Errors: those of a handle.
  * Threads: one at a time for each controls handle; another one's use at this moment is noticed.
  *
  * # Safety
@@ -811,7 +810,7 @@ SinewStatus sinew_controls_reset(struct SinewControls *controls);
  * Allocates nothing and waits for nothing. Components at rest are skipped; where no control moved since the workspace's last
  * frame, only the outputs are written.
  *
- * Errors: those of a handle; `IN_USE`, `FOREIGN_WORKSPACE`, `FOREIGN_CONTROLS`, `TOO_SHORT`, `TOO_LONG`, `OVERLAP`,
+ * Errors: those of a handle; `FOREIGN_WORKSPACE`, `FOREIGN_CONTROLS`, `TOO_SHORT`, `TOO_LONG`, `OVERLAP`,
  * `STRUCT_SIZE`, `UNKNOWN_OPTION`, `NOT_FINITE` (something wrote over the weights), `FRAME_OVERFLOW` (then positions and
  * normals are those of the rest shape).
  * Threads: any number at a time for one basis; one at a time for each workspace and each controls handle, and another

@@ -147,8 +147,7 @@ pub unsafe extern "C" fn sinew_basis_open(
 /// Ends a basis: later calls with it are refused with `CLOSED_HANDLE` while its memory stands. There is nothing to free, so
 /// this is optional before memory and package are given back.
 ///
-/// Errors: `IN_USE`, and those of a handle: `NULL_POINTER`, `MISALIGNED`, `NOT_A_HANDLE`, `WRONG_HANDLE`, `CLOSED_HANDLE`,
-/// `MOVED_HANDLE`, `DAMAGED_HANDLE`.
+/// Errors: those of a handle.
 /// Threads: any, when no other uses the basis; one that does at this moment is noticed.
 ///
 /// # Safety

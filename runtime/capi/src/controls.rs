@@ -152,7 +152,7 @@ pub unsafe extern "C" fn sinew_controls_create(
 /// Ends controls: later calls with them are refused with `CLOSED_HANDLE` while their memory stands. There is nothing to
 /// free, so this is optional before the memory is given back.
 ///
-/// Errors: those of a handle; `IN_USE`.
+/// Errors: those of a handle.
 /// Threads: one at a time for each controls handle; another one's use at this moment is noticed.
 ///
 /// # Safety
@@ -168,7 +168,7 @@ pub unsafe extern "C" fn sinew_controls_close(controls: *mut SinewControls) -> S
 ///
 /// `taken`: NULL, or takes the weight after clamping.
 ///
-/// Errors: those of a handle; `IN_USE`, `NO_SUCH_CONTROL`, `NOT_FINITE`, `OVERLAP`.
+/// Errors: those of a handle; `NO_SUCH_CONTROL`, `NOT_FINITE`, `OVERLAP`.
 /// Threads: one at a time for each controls handle; another one's use at this moment is noticed.
 ///
 /// # Safety
@@ -196,7 +196,7 @@ pub unsafe extern "C" fn sinew_control_set(
 
 /// Sets a control beyond its stops, where a pose may leave what was seen in training.
 ///
-/// Errors: those of a handle; `IN_USE`, `NO_SUCH_CONTROL`, `NOT_FINITE`.
+/// Errors: those of a handle; `NO_SUCH_CONTROL`, `NOT_FINITE`.
 /// Threads: one at a time for each controls handle; another one's use at this moment is noticed.
 ///
 /// # Safety
@@ -218,7 +218,7 @@ pub unsafe extern "C" fn sinew_control_set_unclamped(
 
 /// The weight of a control.
 ///
-/// Errors: those of a handle; `IN_USE`, `NO_SUCH_CONTROL`, `OVERLAP`.
+/// Errors: those of a handle; `NO_SUCH_CONTROL`, `OVERLAP`.
 /// Threads: one at a time for each controls handle; another one's use at this moment is noticed.
 ///
 /// # Safety
@@ -246,7 +246,7 @@ pub unsafe extern "C" fn sinew_control_get(
 /// `weights`, `weight_count`: exactly K.
 /// `details`: NULL, or takes the numbers behind a refusal.
 ///
-/// Errors: those of a handle; `IN_USE`, `TOO_SHORT`, `NO_SUCH_CONTROL` (more than K), `NOT_FINITE` (none is set),
+/// Errors: those of a handle; `TOO_SHORT`, `NO_SUCH_CONTROL` (more than K), `NOT_FINITE` (none is set),
 /// `OVERLAP`, `STRUCT_SIZE`.
 /// Threads: one at a time for each controls handle; another one's use at this moment is noticed.
 ///
@@ -288,7 +288,7 @@ pub unsafe extern "C" fn sinew_controls_set_all(
 ///
 /// `weights`, `weight_count`: at least K; more stay untouched.
 ///
-/// Errors: those of a handle; `IN_USE`, `TOO_SHORT`, `TOO_LONG`, `OVERLAP`.
+/// Errors: those of a handle; `TOO_SHORT`, `TOO_LONG`, `OVERLAP`.
 /// Threads: one at a time for each controls handle; another one's use at this moment is noticed.
 ///
 /// # Safety
@@ -313,7 +313,7 @@ pub unsafe extern "C" fn sinew_controls_get_all(
 
 /// All controls to rest.
 ///
-/// Errors: those of a handle; `IN_USE`.
+/// Errors: those of a handle.
 /// Threads: one at a time for each controls handle; another one's use at this moment is noticed.
 ///
 /// # Safety

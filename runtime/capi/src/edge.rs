@@ -1,6 +1,7 @@
 //! The edge itself: what every exported function runs inside. A panic stops here and becomes a status.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use core::panic::AssertUnwindSafe;
+use std::panic::catch_unwind;
 
 use crate::details::{DetailsOut, SinewDetails};
 use crate::fault::Fault;

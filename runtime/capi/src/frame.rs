@@ -73,7 +73,7 @@ unsafe impl GrowingStruct for SinewFrameReport {
 /// Allocates nothing and waits for nothing. Components at rest are skipped; where no control moved since the workspace's last
 /// frame, only the outputs are written.
 ///
-/// Errors: those of a handle; `IN_USE`, `FOREIGN_WORKSPACE`, `FOREIGN_CONTROLS`, `TOO_SHORT`, `TOO_LONG`, `OVERLAP`,
+/// Errors: those of a handle; `FOREIGN_WORKSPACE`, `FOREIGN_CONTROLS`, `TOO_SHORT`, `TOO_LONG`, `OVERLAP`,
 /// `STRUCT_SIZE`, `UNKNOWN_OPTION`, `NOT_FINITE` (something wrote over the weights), `FRAME_OVERFLOW` (then positions and
 /// normals are those of the rest shape).
 /// Threads: any number at a time for one basis; one at a time for each workspace and each controls handle, and another

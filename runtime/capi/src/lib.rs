@@ -10,6 +10,7 @@
 //! has changed nothing (the two exceptions say so: [`SinewStatus::FrameOverflow`] and [`SinewStatus::Internal`]).
 
 mod basis;
+mod classify;
 mod controls;
 mod details;
 mod edge;

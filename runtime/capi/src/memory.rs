@@ -123,7 +123,7 @@ pub(crate) fn array<T>(
         });
     }
     // The whole must be possible, not only the part in use: a length gone wrong is noticed.
-    let whole = count.checked_mul(size_of::<T>()).unwrap_or(usize::MAX);
+    let whole = count.saturating_mul(size_of::<T>());
     Region::new(pointer, whole, name, access)?;
     regions.add(Region::new(pointer, least * size_of::<T>(), name, access)?)
 }

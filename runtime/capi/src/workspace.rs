@@ -85,7 +85,7 @@ pub unsafe extern "C" fn sinew_workspace_create(
 /// Ends a workspace: later calls with it are refused with `CLOSED_HANDLE` while its memory stands. There is nothing to
 /// free, so this is optional before the memory is given back.
 ///
-/// Errors: those of a handle; `IN_USE`.
+/// Errors: those of a handle.
 /// Threads: one at a time for each workspace; another one's use at this moment is noticed.
 ///
 /// # Safety

@@ -71,7 +71,7 @@ pub fn libraries() -> &'static Libraries {
         };
         Libraries {
             archive: with("a"),
-            shared: with("so"),
+            shared: with(std::env::consts::DLL_EXTENSION),
         }
     })
 }
