@@ -1,5 +1,5 @@
-//! Which crate may know which: formats <- runtime, formats and runtime <- trainer, all <- tests; and what the runtime
-//! may pull in. An arrow not listed here is a change of architecture.
+//! Which crate may know which: formats <- runtime, formats and runtime <- capi and trainer, all <- tests; and what the
+//! runtime may pull in. An arrow not listed here is a change of architecture.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -14,6 +14,7 @@ use sinew_tests::workspace_folder;
 const ARROWS: &[(&str, &[&str])] = &[
     ("sinew-formats", &[]),
     ("sinew-runtime", &["sinew-formats"]),
+    ("sinew-capi", &["sinew-formats", "sinew-runtime"]),
     ("sinew-bake", &["sinew-formats"]),
     ("sinew-synthesize", &["sinew-formats"]),
     ("sinew-peers", &["sinew-formats", "sinew-bake", "sinew-synthesize"]),
