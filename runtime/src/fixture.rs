@@ -1,16 +1,17 @@
 //! Small baked packages for unit tests: a grid, a hand-made component tree and a dense factor.
 
+use core::cmp::Ordering;
 use std::format;
 use std::string::String;
 use std::vec;
 use std::vec::Vec;
 
 use half::f16;
-use sinew_formats::package::{AlignedBytes, BakedBasis, BakedBlock, BakedComponent, NONE, write_baked};
+use sinew_formats::package::{AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedTier, NONE, write_baked};
 
 use crate::basis::Basis;
 use crate::simd::scalar::naive::Noise;
-use crate::simd::scalar::poisson::{Factor, Rings};
+use crate::simd::scalar::poisson::{BLOCK, Factor, Rings};
 use crate::workspace::{Workspace, WorkspaceLayout};
 
 /// A bumpy grid of triangles in a scrambled solver order, every edge of another weight.
@@ -112,8 +113,8 @@ fn gcd(a: u32, b: u32) -> u32 {
 pub(crate) struct DenseFactor {
     pub(crate) offsets: Vec<u32>,
     pub(crate) rows: Vec<u32>,
-    pub(crate) values: Vec<f32>,
-    pub(crate) inverse_pivots: Vec<f32>,
+    pub(crate) tiles: Vec<[f32; 16]>,
+    pub(crate) inverse_diagonals: Vec<[f32; 16]>,
 }
 
 impl DenseFactor {
@@ -121,38 +122,89 @@ impl DenseFactor {
         Factor {
             offsets: &self.offsets,
             rows: &self.rows,
-            values: &self.values,
-            inverse_pivots: &self.inverse_pivots,
+            tiles: &self.tiles,
+            inverse_diagonals: &self.inverse_diagonals,
         }
     }
 }
 
-/// `F D F^T` of a dense symmetric matrix, zeros left out.
+/// `F D F^T` of a dense symmetric matrix by scalars, gathered into tiles; zero tiles left out.
 pub(crate) fn factorise(matrix: &[Vec<f64>]) -> DenseFactor {
     let count = matrix.len();
-    let mut a = matrix.to_vec();
+    let padded = count.next_multiple_of(BLOCK);
+    let mut a = vec![vec![0.0; padded]; padded];
+    for i in 0..padded {
+        match matrix.get(i) {
+            Some(row) => a[i][..count].copy_from_slice(row),
+            None => a[i][i] = 1.0,
+        }
+    }
+    for j in 0..padded {
+        for i in j + 1..padded {
+            let value = a[i][j] / a[j][j];
+            for c in j + 1..=i {
+                a[i][c] -= value * a[c][j];
+            }
+        }
+        let pivot = a[j][j];
+        a[j + 1..].iter_mut().for_each(|row| row[j] /= pivot);
+    }
     let mut factor = DenseFactor {
         offsets: vec![0],
         rows: vec![],
-        values: vec![],
-        inverse_pivots: vec![],
+        tiles: vec![],
+        inverse_diagonals: vec![],
     };
-    for j in 0..count {
-        let pivot = a[j][j];
-        factor.inverse_pivots.push((1.0 / pivot) as f32);
-        for i in j + 1..count {
-            let value = a[i][j] / pivot;
-            if value != 0.0 {
-                factor.rows.push(i as u32);
-                factor.values.push(value as f32);
-                for c in j + 1..count {
-                    a[i][c] -= value * a[j][c];
-                }
+    for first in (0..padded).step_by(BLOCK) {
+        let unit = Matrix4::from_fn(|i, j| match i.cmp(&j) {
+            Ordering::Less => 0.0,
+            Ordering::Equal => 1.0,
+            Ordering::Greater => a[first + i][first + j],
+        });
+        let inverse = unit.inverse();
+        factor.inverse_diagonals.push(core::array::from_fn(|n| {
+            let (i, j) = (n / BLOCK, n % BLOCK);
+            if first + i.max(j) >= count {
+                return 0.0;
+            }
+            let terms = (0..BLOCK).map(|k| inverse.0[k][i] * inverse.0[k][j] / a[first + k][first + k]);
+            terms.sum::<f64>() as f32
+        }));
+        for row in (first + BLOCK..padded).step_by(BLOCK) {
+            let tile: [f32; 16] = core::array::from_fn(|n| {
+                let terms = (0..BLOCK).map(|k| a[row + n / BLOCK][first + k] * inverse.0[k][n % BLOCK]);
+                terms.sum::<f64>() as f32
+            });
+            if tile != [0.0; 16] {
+                factor.rows.push((row / BLOCK) as u32);
+                factor.tiles.push(tile);
             }
         }
         factor.offsets.push(factor.rows.len() as u32);
     }
     factor
+}
+
+/// Unit lower triangular.
+struct Matrix4([[f64; BLOCK]; BLOCK]);
+
+impl Matrix4 {
+    fn from_fn(entry: impl Fn(usize, usize) -> f64) -> Self {
+        Self(core::array::from_fn(|i| core::array::from_fn(|j| entry(i, j))))
+    }
+
+    /// By forward substitution of the identity.
+    fn inverse(&self) -> Self {
+        let mut inverse = Self::from_fn(|i, j| f64::from(i == j));
+        for i in 0..BLOCK {
+            for k in 0..i {
+                for j in 0..BLOCK {
+                    inverse.0[i][j] -= self.0[i][k] * inverse.0[k][j];
+                }
+            }
+        }
+        inverse
+    }
 }
 
 /// A baked package in memory, and what went into it.
@@ -189,6 +241,7 @@ impl Package {
             (0..count).filter(|s| s % 2 == 0).collect(),
         ];
         let (mut blocks, mut components) = (Vec::new(), Vec::new());
+        let (mut support_offsets, mut entry_offsets) = (vec![0], vec![0]);
         let (mut support, mut slots, mut values) = (Vec::new(), Vec::new(), Vec::new());
         let names: Vec<String> = (0..Self::COMPONENTS).map(name).collect();
         for (b, (parent, component_count)) in [(NONE, 2), (0, 1), (1, 2)].into_iter().enumerate() {
@@ -197,52 +250,54 @@ impl Package {
                 parent_component: parent,
                 first_component: components.len() as u32,
                 component_count,
-                first_support: support.len() as u32,
-                support_count: supports[b].len() as u32,
                 bias: noise.features().map(|x| 0.3 * x),
             });
             for _ in 0..component_count {
                 let k = components.len();
-                let first_entry = slots.len() as u32;
                 for slot in 0..supports[b].len() as u32 {
                     if !(slot as usize + k).is_multiple_of(5) {
                         slots.push(slot);
                         values.push(noise.features().map(|x| f16::from_f32(0.125 * x).to_bits()));
                     }
                 }
+                entry_offsets.push(slots.len() as u32);
                 components.push(BakedComponent {
                     name: &names[k],
                     block: b as u32,
                     minimum: -1.0 - k as f32,
                     maximum: 1.5,
-                    first_entry,
-                    entry_count: slots.len() as u32 - first_entry,
                     value_scale: 4.0,
                 });
             }
             support.extend(&supports[b]);
+            support_offsets.push(support.len() as u32);
         }
         let factor = factorise(&grid.laplacian());
         let bytes = write_baked(&BakedBasis {
             compact_id,
-            rest_positions: &grid.rest,
             faces: &grid.faces,
             solver_from_vertex: &grid.solver_from_vertex,
             vertex_from_solver: &vertex_from_solver,
-            ring_offsets: &grid.offsets,
-            ring: &grid.ring,
-            ring_weights: &grid.weights,
-            factor_offsets: &factor.offsets,
-            factor_rows: &factor.rows,
-            factor_values: &factor.values,
-            inverse_pivots: &factor.inverse_pivots,
             rotation_scale: 1.5,
             stretch_scale: 0.4,
             blocks: &blocks,
             components: &components,
-            support: &support,
-            entry_slots: &slots,
-            entry_values: &values,
+            exact: BakedTier {
+                rest_positions: &grid.rest,
+                ring_offsets: &grid.offsets,
+                ring: &grid.ring,
+                ring_weights: &grid.weights,
+                tile_offsets: &factor.offsets,
+                tile_rows: &factor.rows,
+                tiles: &factor.tiles,
+                inverse_diagonals: &factor.inverse_diagonals,
+                support_offsets: &support_offsets,
+                support: &support,
+                entry_offsets: &entry_offsets,
+                entry_slots: &slots,
+                entry_values: &values,
+            },
+            fast: None,
         })
         .unwrap();
         let rest_in_source_order = grid.solver_from_vertex.iter().map(|&s| grid.rest[s as usize]).collect();

@@ -1,11 +1,8 @@
 //! Linearize: how the positions move when one weight does, exactly, at the workspace's pose. For fitting weights to
 //! positions by Gauss-Newton, offline and on dragged vertices.
 
-use sinew_formats::package::FEATURE_COUNT;
-
 use crate::basis::Basis;
 use crate::blend::blend_block;
-use crate::decode::scales;
 use crate::error::{Buffer, FrameError};
 use crate::normals::check_length;
 use crate::simd::scalar::blend::activate_tangent;
@@ -54,6 +51,7 @@ impl Tangent<'_> {
     pub fn run(self, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
         self.validate(workspace)?;
         let Workspace {
+            kernels,
             weights,
             features,
             pre_activations,
@@ -61,24 +59,26 @@ impl Tangent<'_> {
             solution,
             ..
         } = workspace;
-        let block = self.basis.block(self.basis.component(self.component).block);
+        let tier = self.basis.exact();
+        let b = tier.block_of(self.component);
+        let bias = tier.block(b).bias;
         // The features are the sum of all blocks; the tanh of this one needs its own blend back.
-        let pre = blend_block(self.basis, &block, weights, pre_activations);
-        let support = self.basis.support(&block);
-        let entries = self.basis.entries(self.component);
-        gradients.fill([0.0; FEATURE_COUNT]);
+        let pre = blend_block(&tier, b, weights, pre_activations);
+        let support = tier.support(b);
+        let entries = tier.entries(self.component);
+        gradients.fill([[0.0; 4]; 3]);
         for (&slot, value) in entries.slots.iter().zip(entries.values) {
             let v = support[slot as usize] as usize;
-            let dx = activate_tangent(&block.bias, &pre[slot as usize], value, entries.scale);
-            gradients[v] = gradient_tangent(scales(self.basis), &features[v], &dx);
+            let dx = activate_tangent(&bias, &pre[slot as usize], value, entries.scale);
+            gradients[v] = gradient_tangent(tier.scales(), &features[v], &dx);
         }
-        solve(self.basis, gradients, solution);
+        solve(*kernels, &tier, gradients, solution);
         for (d, &v) in solution.iter().zip(self.basis.vertex_from_solver()) {
             if !d.iter().all(|x| x.is_finite()) {
                 self.displacement.fill([0.0; 3]);
                 return Err(FrameError::NotFinite { vertex: v as usize });
             }
-            self.displacement[v as usize] = *d;
+            self.displacement[v as usize] = [d[0], d[1], d[2]];
         }
         Ok(())
     }

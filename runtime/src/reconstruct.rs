@@ -44,13 +44,17 @@ impl Reconstruct<'_> {
     pub fn run(self, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
         self.validate(workspace)?;
         let Workspace {
-            gradients, solution, ..
+            kernels,
+            gradients,
+            solution,
+            ..
         } = workspace;
+        let tier = self.basis.exact();
         for (v, x) in self.features.iter().enumerate() {
             let s = self.basis.solver_from_vertex()[v] as usize;
-            decode(self.basis, core::slice::from_ref(x), &mut gradients[s..=s]);
+            decode(&tier, core::slice::from_ref(x), &mut gradients[s..=s]);
         }
-        solve(self.basis, gradients, solution);
+        solve(*kernels, &tier, gradients, solution);
         emit(self.basis, solution, self.positions)
     }
 }

@@ -7,6 +7,7 @@ use sinew_formats::package::FEATURE_COUNT;
 use crate::basis::Basis;
 use crate::error::{FrameError, WorkspaceError};
 use crate::simd::Kernels;
+use crate::simd::scalar::poisson::{BLOCK, Gradient, Lane};
 
 /// Start of every buffer: a cache line, and the widest vector register.
 const ALIGNMENT: usize = 64;
@@ -21,7 +22,7 @@ pub struct WorkspaceLayout {
 }
 
 impl WorkspaceLayout {
-    /// Layout for `basis`: about 132 bytes a vertex.
+    /// Layout for `basis`: about 152 bytes a vertex.
     pub fn for_basis(basis: &Basis<'_>) -> Self {
         let sections = Sections::of(basis);
         Self {
@@ -39,26 +40,33 @@ impl WorkspaceLayout {
 /// Element counts of the buffers, in the order in which they lie in memory.
 struct Sections {
     components: usize,
-    vertices: usize,
+    nodes: usize,
     largest_support: usize,
 }
 
 impl Sections {
     fn of(basis: &Basis<'_>) -> Self {
-        let supports = (0..basis.block_count()).map(|b| basis.block(b).support_count as usize);
+        let tier = basis.exact();
+        let supports = (0..tier.block_count()).map(|b| tier.support(b).len());
         Self {
             components: basis.component_count(),
-            vertices: basis.vertex_count(),
+            nodes: tier.node_count(),
             largest_support: supports.max().unwrap_or(0),
         }
+    }
+
+    /// Nodes of whole blocks: the solve runs on tiles.
+    fn padded_nodes(&self) -> usize {
+        self.nodes.next_multiple_of(BLOCK)
     }
 
     /// The limits of the format keep this under a gigabyte, which fits 32 bits.
     fn size_bytes(&self) -> usize {
         section_bytes::<f32>(self.components)
-            + 2 * section_bytes::<[f32; FEATURE_COUNT]>(self.vertices)
+            + section_bytes::<[f32; FEATURE_COUNT]>(self.nodes)
             + section_bytes::<[f32; FEATURE_COUNT]>(self.largest_support)
-            + 2 * section_bytes::<[f32; 3]>(self.vertices)
+            + section_bytes::<Gradient>(self.nodes)
+            + 2 * section_bytes::<Lane>(self.padded_nodes())
     }
 }
 
@@ -77,14 +85,14 @@ pub struct Workspace<'w> {
     pub(crate) weights: &'w mut [f32],
     /// Features of the pose, network units. Shape: `[V]`, solver order.
     pub(crate) features: &'w mut [[f32; FEATURE_COUNT]],
-    /// Displacement of the pose. Shape: `[V]`, solver order.
-    pub(crate) displacement: &'w mut [[f32; 3]],
+    /// Displacement of the pose, zero after the last node. Shape: `[4 T]`, solver order.
+    pub(crate) displacement: &'w mut [Lane],
     /// Scratch: a block's blend. Shape: `[largest support]`.
     pub(crate) pre_activations: &'w mut [[f32; FEATURE_COUNT]],
-    /// Scratch: `D = T - I` or its derivative. Shape: `[V]`, solver order.
-    pub(crate) gradients: &'w mut [[f32; FEATURE_COUNT]],
-    /// Scratch: a solve that is not the pose's. Shape: `[V]`, solver order.
-    pub(crate) solution: &'w mut [[f32; 3]],
+    /// Scratch: `D = T - I` or its derivative. Shape: `[N]`, solver order.
+    pub(crate) gradients: &'w mut [Gradient],
+    /// Scratch: a solve that is not the pose's. Shape: that of `displacement`.
+    pub(crate) solution: &'w mut [Lane],
 }
 
 impl<'w> Workspace<'w> {
@@ -117,11 +125,11 @@ impl<'w> Workspace<'w> {
         let memory = &mut memory[skipped..required_bytes];
         memory.fill(0);
         let (weights, memory) = carve(memory, sections.components);
-        let (features, memory) = carve(memory, sections.vertices);
-        let (displacement, memory) = carve(memory, sections.vertices);
+        let (features, memory) = carve(memory, sections.nodes);
+        let (displacement, memory) = carve(memory, sections.padded_nodes());
         let (pre_activations, memory) = carve(memory, sections.largest_support);
-        let (gradients, memory) = carve(memory, sections.vertices);
-        let (solution, _) = carve(memory, sections.vertices);
+        let (gradients, memory) = carve(memory, sections.nodes);
+        let (solution, _) = carve(memory, sections.padded_nodes());
         let basis_id = basis.id();
         Ok(Self {
             basis_id,
@@ -154,7 +162,7 @@ impl<'w> Workspace<'w> {
     pub(crate) fn rest(&mut self) {
         self.weights.fill(0.0);
         self.features.fill([0.0; FEATURE_COUNT]);
-        self.displacement.fill([0.0; 3]);
+        self.displacement.fill([0.0; 4]);
     }
 
     /// Refuses a basis other than the one this workspace was made for.
@@ -242,7 +250,7 @@ mod tests {
         let package = Package::small(1);
         let basis = open(&package);
         let layout = WorkspaceLayout::for_basis(&basis);
-        let exact = 4 * basis.component_count() + 132 * basis.vertex_count();
+        let exact = 4 * basis.component_count() + 152 * basis.vertex_count();
         assert!(
             layout.size_bytes <= exact + 6 * layout.alignment,
             "{} {exact}",

@@ -9,8 +9,8 @@ pub const FACES: usize = 16 << 20;
 pub const BRIDGES: usize = VERTICES;
 /// Entries of all one-rings together.
 pub const RING_ENTRIES: usize = 64 << 20;
-/// Entries of the factor below its diagonal.
-pub const FACTOR_ENTRIES: usize = 128 << 20;
+/// Tiles of the factor below its diagonal.
+pub const TILES: usize = 32 << 20;
 /// Components, and so controls.
 pub const COMPONENTS: usize = 4096;
 /// Autoencoder blocks: the root and at most one a component.
@@ -41,9 +41,9 @@ pub const FEATURE_SCALE: f32 = 1e3;
 pub const NETWORK_VALUE: f32 = 1e6;
 /// Cotangent weight of an edge.
 pub const EDGE_WEIGHT: f32 = 1e9;
-/// Entry of the factor, either sign; that of a Laplacian with non-negative weights is at most 1.
+/// Entry of the factor, either sign; for a Laplacian with non-negative weights the entries of a row are at most 1 together.
 pub const FACTOR_VALUE: f32 = 1e6;
-/// Inverse of a pivot.
+/// Entry of the inverse of a diagonal block, either sign.
 pub const INVERSE_PIVOT: f32 = 1e12;
 /// Quality figures.
 pub const QUALITY: f32 = 1e9;

@@ -7,14 +7,13 @@ use rkyv::{api::high::to_bytes_in, rancor::Failure, util::AlignedVec};
 
 use super::{BakedBasis, BakedView, CompactBasis, CompactView, HEADER_BYTES, Header, OpenError, PackageKind};
 
-/// A package, or any bytes, at a multiple of [`super::PAYLOAD_ALIGNMENT`] in memory.
-#[derive(Clone)]
-pub struct AlignedBytes(AlignedVec<16>);
+/// More than [`super::PAYLOAD_ALIGNMENT`] asks for: the factor's tiles then lie on cache lines.
+const CACHE_LINE_BYTES: usize = 64;
+const _: () = assert!(CACHE_LINE_BYTES.is_multiple_of(super::PAYLOAD_ALIGNMENT));
 
-const _: () = assert!(
-    super::PAYLOAD_ALIGNMENT == 16,
-    "AlignedBytes keeps the alignment that opening asks for"
-);
+/// A package, or any bytes, at a multiple of 64 bytes in memory, where every package may lie.
+#[derive(Clone)]
+pub struct AlignedBytes(AlignedVec<CACHE_LINE_BYTES>);
 
 impl AlignedBytes {
     /// Copies `bytes` to a place where a package may lie.
@@ -106,11 +105,11 @@ pub fn write_baked(basis: &BakedBasis<'_>) -> Result<AlignedBytes, WriteError> {
 }
 
 /// The archive's pointers are relative, so it may be written where it will stand.
-fn room_for_header() -> AlignedVec<16> {
+fn room_for_header() -> AlignedVec<CACHE_LINE_BYTES> {
     AlignedBytes::zeroed(HEADER_BYTES).0
 }
 
-fn seal(mut package: AlignedVec<16>, kind: PackageKind) -> AlignedBytes {
+fn seal(mut package: AlignedVec<CACHE_LINE_BYTES>, kind: PackageKind) -> AlignedBytes {
     let (header, payload) = package.as_mut_slice().split_at_mut(HEADER_BYTES);
     header.copy_from_slice(&Header::for_payload(kind, payload).to_bytes());
     AlignedBytes(package)

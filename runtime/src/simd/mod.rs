@@ -3,7 +3,14 @@
 //! [`scalar`] is the reference; every other kernel equals it within a named tolerance. Which ones run is decided once, when
 //! a workspace is made: by what the processor says on x86-64, at compile time elsewhere.
 
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod avx2;
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod avx512;
 pub(crate) mod scalar;
+
+#[cfg(test)]
+mod poisson_tests;
 
 /// A set of kernels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -33,9 +40,20 @@ cpufeatures::new!(
 /// Conversion of halves, which `cpufeatures` does not know. Asked after AVX, so the registers are there.
 #[cfg(target_arch = "x86_64")]
 fn f16c_present() -> bool {
+    use core::sync::atomic::{AtomicU8, Ordering};
     /// Of ECX in leaf 1.
     const F16C: u32 = 1 << 29;
-    core::arch::x86_64::__cpuid(1).ecx & F16C != 0
+    const UNKNOWN: u8 = 2;
+    // Kept: a hypervisor may take longer over this instruction than a kernel takes over its work.
+    static PRESENT: AtomicU8 = AtomicU8::new(UNKNOWN);
+    match PRESENT.load(Ordering::Relaxed) {
+        UNKNOWN => {
+            let present = core::arch::x86_64::__cpuid(1).ecx & F16C != 0;
+            PRESENT.store(u8::from(present), Ordering::Relaxed);
+            present
+        }
+        present => present == 1,
+    }
 }
 
 impl Kernels {

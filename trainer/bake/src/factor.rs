@@ -1,5 +1,5 @@
 //! The solver's matrix, its elimination order and its factor: `L + anchor = F D F^T`, computed once in f64 by faer,
-//! stored in f32 for the frame path (factoring in f32 costs three digits, solving in f32 does not).
+//! gathered into tiles and stored in f32 for the frame path (factoring in f32 costs three digits, solving in f32 does not).
 
 use faer::{
     Side,
@@ -15,6 +15,8 @@ use faer::{
         },
     },
 };
+
+use sinew_formats::package::{TILE_ENTRIES, TILE_SIDE};
 
 use super::BakeError;
 
@@ -122,23 +124,126 @@ impl EliminationOrder {
     }
 }
 
-/// Columns of the unit lower factor below the diagonal, and the inverse pivots, as the frame path reads them.
+/// The factor by tiles of 4 x 4, as the frame path reads it: `F` block unit lower triangular, `D` block diagonal.
+/// T = ceil(V / 4) blocks of solver indices that follow each other; what the last block lacks is zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Factor {
-    /// Shape: `[V + 1]`.
+    /// Columns of tiles over `rows`. Shape: `[T + 1]`.
     pub offsets: Vec<u32>,
-    /// Solver indices, ascending within a column, greater than the column.
+    /// Block of rows of each tile, ascending within a column, greater than the column.
     pub rows: Vec<u32>,
-    /// Shape: that of `rows`.
-    pub values: Vec<f32>,
-    /// `1 / D`, positive. Shape: `[V]`.
-    pub inverse_pivots: Vec<f32>,
+    /// Row-major, not all zero. Shape: that of `rows`.
+    pub tiles: Vec<[f32; TILE_ENTRIES]>,
+    /// `1 / D`, symmetric, row-major. Shape: `[T]`.
+    pub inverse_diagonals: Vec<[f32; TILE_ENTRIES]>,
 }
+
+/// Entries of `F` nearer to zero count as zero: a thousandth of what f32 keeps of the diagonal. No product with a number of
+/// the solve, which are flushed at 1e-20, can then be denormal.
+const NEGLIGIBLE: f64 = 1e-10;
+
+type Tile = [[f64; TILE_SIDE]; TILE_SIDE];
 
 impl Factor {
     /// Factors the matrix in the given order.
     /// Errors: a pivot that is not positive (the weights are not those of a connected surface), or no memory.
     pub fn new(laplacian: &AnchoredLaplacian<'_>, order: &EliminationOrder) -> Result<Self, BakeError> {
+        let scalar = ScalarFactor::new(laplacian, order)?;
+        let column_count = laplacian.vertex_count().div_ceil(TILE_SIDE);
+        let mut factor = Self {
+            offsets: vec![0],
+            rows: Vec::new(),
+            tiles: Vec::new(),
+            inverse_diagonals: Vec::new(),
+        };
+        // Place of the tile that stands on a block of rows, in the column at hand.
+        let mut places = vec![usize::MAX; column_count];
+        for column in 0..column_count {
+            let (mut rows, mut tiles): (Vec<u32>, Vec<Tile>) = (Vec::new(), Vec::new());
+            let mut diagonal = identity();
+            let mut inverse_pivots = [0.0; TILE_SIDE];
+            for (c, inverse_pivot) in inverse_pivots.iter_mut().enumerate() {
+                let solver = column * TILE_SIDE + c;
+                if solver == laplacian.vertex_count() {
+                    break;
+                }
+                *inverse_pivot = scalar.inverse_pivots[solver];
+                for (row, value) in scalar.column(solver) {
+                    let (block, r) = (row / TILE_SIDE, row % TILE_SIDE);
+                    if block == column {
+                        diagonal[r][c] = value;
+                        continue;
+                    }
+                    if places[block] == usize::MAX {
+                        places[block] = tiles.len();
+                        rows.push(block as u32);
+                        tiles.push(Tile::default());
+                    }
+                    tiles[places[block]][r][c] = value;
+                }
+            }
+            rows.iter().for_each(|&block| places[block as usize] = usize::MAX);
+            factor.push_column(rows, &tiles, &inverse_of_unit_lower(&diagonal), &inverse_pivots);
+        }
+        Ok(factor)
+    }
+
+    /// With `L` of a block's diagonal: tiles become `tile L^-1`, the pivots `L D L^T`.
+    fn push_column(&mut self, rows: Vec<u32>, tiles: &[Tile], inverse: &Tile, inverse_pivots: &[f64; TILE_SIDE]) {
+        let mut column: Vec<(u32, [f32; TILE_ENTRIES])> = rows
+            .into_iter()
+            .zip(tiles)
+            .map(|(row, tile)| (row, narrowed(&product(tile, inverse))))
+            .filter(|(_, tile)| *tile != [0.0; TILE_ENTRIES])
+            .collect();
+        column.sort_unstable_by_key(|&(row, _)| row);
+        self.rows.extend(column.iter().map(|&(row, _)| row));
+        self.tiles.extend(column.iter().map(|&(_, tile)| tile));
+        self.offsets.push(self.rows.len() as u32);
+        self.inverse_diagonals.push(core::array::from_fn(|n| {
+            let (i, j) = (n / TILE_SIDE, n % TILE_SIDE);
+            let terms = (0..TILE_SIDE).map(|k| inverse[k][i] * inverse_pivots[k] * inverse[k][j]);
+            terms.sum::<f64>() as f32
+        }));
+    }
+}
+
+fn identity() -> Tile {
+    core::array::from_fn(|i| core::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }))
+}
+
+fn product(a: &Tile, b: &Tile) -> Tile {
+    a.map(|row| core::array::from_fn(|j| row.iter().zip(b).map(|(value, other)| value * other[j]).sum()))
+}
+
+fn inverse_of_unit_lower(lower: &Tile) -> Tile {
+    let mut inverse = identity();
+    for i in 0..TILE_SIDE {
+        for j in 0..i {
+            inverse[i][j] = -(j..i).map(|k| lower[i][k] * inverse[k][j]).sum::<f64>();
+        }
+    }
+    inverse
+}
+
+fn narrowed(tile: &Tile) -> [f32; TILE_ENTRIES] {
+    core::array::from_fn(|n| {
+        let value = tile[n / TILE_SIDE][n % TILE_SIDE];
+        if value.abs() < NEGLIGIBLE { 0.0 } else { value as f32 }
+    })
+}
+
+/// faer's factor: columns of the unit lower triangle below the diagonal, and the inverse pivots, in f64.
+struct ScalarFactor<'a> {
+    symbolic: &'a simplicial::SymbolicSimplicialCholesky<usize>,
+    /// Each column starts with its pivot.
+    values: Vec<f64>,
+    /// `1 / D`, positive. Shape: `[V]`.
+    inverse_pivots: Vec<f64>,
+}
+
+impl<'a> ScalarFactor<'a> {
+    fn new(laplacian: &AnchoredLaplacian<'_>, order: &'a EliminationOrder) -> Result<Self, BakeError> {
         let vertex_count = laplacian.vertex_count();
         let too_large = BakeError::FactorTooLarge { vertex_count };
         let SymbolicCholeskyRaw::Simplicial(symbolic) = order.symbolic.raw() else {
@@ -161,28 +266,24 @@ impl Factor {
         .map_err(|_| BakeError::NotPositive {
             vertex: laplacian.anchor_vertex,
         })?;
-
-        let mut factor = Self {
-            offsets: vec![0],
-            rows: Vec::new(),
-            values: Vec::new(),
-            inverse_pivots: Vec::new(),
-        };
-        for (column, bounds) in symbolic.col_ptr().windows(2).enumerate() {
-            // Each column starts with its pivot.
-            let inverse_pivot = (1.0 / values[bounds[0]]) as f32;
-            if !(inverse_pivot > 0.0 && inverse_pivot.is_finite()) {
-                return Err(BakeError::NotPositive {
-                    vertex: order.vertex_from_solver[column] as usize,
-                });
-            }
-            factor.inverse_pivots.push(inverse_pivot);
-            for e in bounds[0] + 1..bounds[1] {
-                factor.rows.push(symbolic.row_idx()[e] as u32);
-                factor.values.push(values[e] as f32);
-            }
-            factor.offsets.push(factor.rows.len() as u32);
+        let starts = &symbolic.col_ptr()[..vertex_count];
+        let inverse_pivots: Vec<f64> = starts.iter().map(|&start| 1.0 / values[start]).collect();
+        let sound = |inverse: f64| inverse as f32 > 0.0 && (inverse as f32).is_finite();
+        match inverse_pivots.iter().position(|&inverse| !sound(inverse)) {
+            Some(column) => Err(BakeError::NotPositive {
+                vertex: order.vertex_from_solver[column] as usize,
+            }),
+            None => Ok(Self {
+                symbolic,
+                values,
+                inverse_pivots,
+            }),
         }
-        Ok(factor)
+    }
+
+    /// Rows and values below the diagonal, rows ascending.
+    fn column(&self, column: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let range = self.symbolic.col_ptr()[column] + 1..self.symbolic.col_ptr()[column + 1];
+        range.map(|entry| (self.symbolic.row_idx()[entry], self.values[entry]))
     }
 }

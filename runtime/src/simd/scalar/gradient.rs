@@ -6,6 +6,7 @@ use libm::{sinf, sqrtf};
 use sinew_formats::package::FEATURE_COUNT;
 
 use super::blend::Features;
+use super::poisson::Gradient;
 
 /// Row-major 3x3.
 type Matrix = [[f32; 3]; 3];
@@ -36,29 +37,29 @@ impl FeatureScales {
     }
 }
 
-/// Turns nine features a vertex into nine entries of `D = T - I`, row-major.
+/// Turns nine features a node into `D = T - I`.
 ///
-/// Shape: both `[V]`. Range: the log-rotation may exceed pi. `x = 0` gives `D = 0` to the bit.
-pub(crate) fn gradients(scales: FeatureScales, features: &[Features], gradients: &mut [Features]) {
+/// Shape: both `[N]`. Range: the log-rotation may exceed pi. `x = 0` gives `D = 0` to the bit.
+pub(crate) fn gradients(scales: FeatureScales, features: &[Features], gradients: &mut [Gradient]) {
     for (x, d) in features.iter().zip(gradients) {
         *d = if *x == [0.0; FEATURE_COUNT] {
-            [0.0; FEATURE_COUNT]
+            [[0.0; 4]; 3]
         } else {
             gradient(scales, x)
         };
     }
 }
 
-fn gradient(scales: FeatureScales, x: &Features) -> Features {
+fn gradient(scales: FeatureScales, x: &Features) -> Gradient {
     let e = rotation_less_identity(&scales.log_rotation(x));
     let p = scales.stretch_less_identity(x);
     // (I + E)(I + P) - I = E + P + E P: no difference of near-equal numbers.
     let ep = product(&e, &p);
-    core::array::from_fn(|n| e[n / 3][n % 3] + p[n / 3][n % 3] + ep[n / 3][n % 3])
+    columns(|i, j| e[i][j] + p[i][j] + ep[i][j])
 }
 
-/// Derivative of the gradient when the features move along `dx`: `[J_l(r) dr]x R S + R dS`, row-major.
-pub(crate) fn gradient_tangent(scales: FeatureScales, x: &Features, dx: &Features) -> Features {
+/// Derivative of the gradient when the features move along `dx`: `[J_l(r) dr]x R S + R dS`.
+pub(crate) fn gradient_tangent(scales: FeatureScales, x: &Features, dx: &Features) -> Gradient {
     let r = scales.log_rotation(x);
     let w = left_jacobian(&r, &scales.log_rotation(dx));
     let rotation = plus_identity(rotation_less_identity(&r));
@@ -67,7 +68,12 @@ pub(crate) fn gradient_tangent(scales: FeatureScales, x: &Features, dx: &Feature
         &product(&rotation, &plus_identity(scales.stretch_less_identity(x))),
     );
     let stretched = product(&rotation, &scales.stretch_less_identity(dx));
-    core::array::from_fn(|n| turned[n / 3][n % 3] + stretched[n / 3][n % 3])
+    columns(|i, j| turned[i][j] + stretched[i][j])
+}
+
+/// Entry (row, column) of each, laid out as the right-hand side reads it.
+fn columns(entry: impl Fn(usize, usize) -> f32) -> Gradient {
+    core::array::from_fn(|j| [entry(0, j), entry(1, j), entry(2, j), 0.0])
 }
 
 /// `sin(t) / t` and `(1 - cos t) / t^2` for the squared angle `t^2`.
@@ -167,12 +173,12 @@ mod tests {
             for _ in 0..200 {
                 let x = noise.features();
                 let t = deformation_gradient(scales.rotation, scales.stretch, &x.map(f64::from));
-                let mut found = [[0.0; FEATURE_COUNT]];
+                let mut found = [[[0.0; 4]; 3]];
                 gradients(scales, &[x], &mut found);
                 for n in 0..9 {
                     let expected = t[n / 3][n % 3] - f64::from(n / 3 == n % 3);
                     assert!(
-                        (f64::from(found[0][n]) - expected).abs() < TOLERANCE,
+                        (f64::from(found[0][n % 3][n / 3]) - expected).abs() < TOLERANCE,
                         "{scales:?} {x:?}"
                     );
                 }
@@ -182,10 +188,10 @@ mod tests {
 
     #[test]
     fn rest_is_exact() {
-        let mut found = [[1.0; FEATURE_COUNT]; 2];
+        let mut found = [[[1.0; 4]; 3]; 2];
         gradients(SCALES[0], &[[0.0; FEATURE_COUNT]; 2], &mut found);
-        assert_eq!(found, [[0.0; FEATURE_COUNT]; 2]);
-        assert_eq!(gradient(SCALES[0], &[0.0; FEATURE_COUNT]), [0.0; FEATURE_COUNT]);
+        assert_eq!(found, [[[0.0; 4]; 3]; 2]);
+        assert_eq!(gradient(SCALES[0], &[0.0; FEATURE_COUNT]), [[0.0; 4]; 3]);
     }
 
     #[test]
@@ -205,7 +211,7 @@ mod tests {
                 for n in 0..9 {
                     let expected = (ahead[n / 3][n % 3] - behind[n / 3][n % 3]) / (2.0 * STEP);
                     assert!(
-                        (f64::from(found[n]) - expected).abs() < 3.0 * TOLERANCE,
+                        (f64::from(found[n % 3][n / 3]) - expected).abs() < 3.0 * TOLERANCE,
                         "{scales:?} {x:?} {dx:?}"
                     );
                 }
@@ -227,15 +233,9 @@ mod tests {
         assert_eq!(
             found,
             [
-                0.1,
-                -3.0 + 0.2,
-                2.0 + 0.3,
-                3.0 + 0.2,
-                0.4,
-                -1.0 + 0.5,
-                -2.0 + 0.3,
-                1.0 + 0.5,
-                0.6
+                [0.1, 3.0 + 0.2, -2.0 + 0.3, 0.0],
+                [-3.0 + 0.2, 0.4, 1.0 + 0.5, 0.0],
+                [2.0 + 0.3, -1.0 + 0.5, 0.6, 0.0],
             ]
         );
     }

@@ -4,16 +4,26 @@
 //! symmetric c the normal equations are `sum_j c_ij (d_i - d_j) = 1/2 sum_j c_ij (D_i + D_j)(r_i - r_j)`. The factor
 //! holds `L` and the penalty that keeps the anchor vertex at zero.
 
-use super::blend::Features;
+/// `D = T - I`, or a derivative of it, as the right-hand side reads it: three columns, each filled up with a zero.
+pub(crate) type Gradient = [[f32; 4]; 3];
 
-/// Right-hand sides smaller than this are zero: products with them would be denormal, and denormals cost 22 times the
-/// time of a solve.
-const FLUSH_BELOW: f32 = 1e-20;
+/// What one node has in a right-hand side or a solution: x, y, z, and a zero.
+pub(crate) type Lane = [f32; 4];
+
+/// Four nodes of a vector: the rows that one tile of the factor multiplies.
+pub(crate) type Block = [Lane; BLOCK];
+
+/// Nodes of a block, and rows and columns of a tile.
+pub(crate) const BLOCK: usize = 4;
+
+/// Numbers of the solve smaller than this are zero. With no entry of the factor nearer to zero than 1e-10 all products
+/// are then normal numbers; denormal ones cost 22 times the time of a solve.
+pub(crate) const FLUSH_BELOW: f32 = 1e-20;
 
 /// One-rings as compressed rows, with the cotangent weight of each edge.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rings<'a> {
-    /// Shape: `[V + 1]`.
+    /// Shape: `[N + 1]`.
     pub(crate) offsets: &'a [u32],
     /// Shape: `[2 * edges]`.
     pub(crate) neighbours: &'a [u32],
@@ -21,145 +31,129 @@ pub(crate) struct Rings<'a> {
     pub(crate) weights: &'a [f32],
 }
 
-/// `F D F^T` with unit lower F by columns, diagonal left out.
+/// `F D F^T` in tiles: F block unit lower triangular, D block diagonal. T = ceil(N / 4) columns of tiles.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Factor<'a> {
-    /// Shape: `[V + 1]`.
+    /// Columns over `rows`. Shape: `[T + 1]`.
     pub(crate) offsets: &'a [u32],
-    /// Greater than their column.
+    /// Which block a tile stands on; greater than its column.
     pub(crate) rows: &'a [u32],
-    /// Shape: that of `rows`.
-    pub(crate) values: &'a [f32],
-    /// Shape: `[V]`.
-    pub(crate) inverse_pivots: &'a [f32],
+    /// Row-major. Shape: that of `rows`.
+    pub(crate) tiles: &'a [[f32; 16]],
+    /// Symmetric; zero where the last block has no node. Shape: `[T]`.
+    pub(crate) inverse_diagonals: &'a [[f32; 16]],
 }
 
-/// `b_i = 1/2 sum_j c_ij (D_i + D_j)(r_i - r_j)`. Shape: all `[V]`, solver order.
-pub(crate) fn right_hand_side(rings: &Rings<'_>, rest: &[[f32; 3]], gradients: &[Features], b: &mut [[f32; 3]]) {
-    for (i, out) in b.iter_mut().enumerate() {
-        let (r, d) = (&rest[i], &gradients[i]);
+impl<'a> Factor<'a> {
+    /// Rows and tiles of a column.
+    pub(crate) fn column(&self, column: usize) -> impl DoubleEndedIterator<Item = (usize, &'a [f32; 16])> + use<'a> {
+        let range = self.offsets[column] as usize..self.offsets[column + 1] as usize;
+        let rows = self.rows[range.clone()].iter().map(|&row| row as usize);
+        rows.zip(&self.tiles[range])
+    }
+}
+
+/// `b_i = 1/2 (D_i g_i + sum_j D_j e_ij)` with `e_ij = c_ij (r_i - r_j)` and `g_i = sum_j e_ij`.
+///
+/// Shape: `rest` and `gradients` `[N]`, `b` at least `[N]`; solver order.
+pub(crate) fn right_hand_side(rings: &Rings<'_>, rest: &[[f32; 3]], gradients: &[Gradient], b: &mut [Lane]) {
+    for (i, (r, d)) in rest.iter().zip(gradients).enumerate() {
         let mut sum = [0.0_f32; 3];
+        let mut total = [0.0_f32; 3];
         let ring = rings.offsets[i] as usize..rings.offsets[i + 1] as usize;
         for (&j, &weight) in rings.neighbours[ring.clone()].iter().zip(&rings.weights[ring]) {
             let (rj, dj) = (&rest[j as usize], &gradients[j as usize]);
-            let edge = [r[0] - rj[0], r[1] - rj[1], r[2] - rj[2]];
+            let edge: [f32; 3] = core::array::from_fn(|c| weight * (r[c] - rj[c]));
+            add_product(&mut sum, dj, &edge);
             for c in 0..3 {
-                let row = 3 * c;
-                let turned = (d[row] + dj[row]) * edge[0]
-                    + (d[row + 1] + dj[row + 1]) * edge[1]
-                    + (d[row + 2] + dj[row + 2]) * edge[2];
-                sum[c] += 0.5 * weight * turned;
+                total[c] += edge[c];
             }
         }
-        *out = sum.map(|x| if x.abs() < FLUSH_BELOW { 0.0 } else { x });
+        add_product(&mut sum, d, &total);
+        let [x, y, z] = sum.map(|x| flushed(0.5 * x));
+        b[i] = [x, y, z, 0.0];
     }
 }
 
-/// Solves `F D F^T x = b` in place for x, y and z together. Shape: `b` `[V]`, solver order.
-pub(crate) fn substitute(factor: &Factor<'_>, b: &mut [[f32; 3]]) {
-    for j in 0..b.len() {
-        let x = b[j];
-        if x == [0.0; 3] {
+fn add_product(sum: &mut [f32; 3], gradient: &Gradient, edge: &[f32; 3]) {
+    for row in 0..3 {
+        sum[row] += gradient[0][row] * edge[0] + gradient[1][row] * edge[1] + gradient[2][row] * edge[2];
+    }
+}
+
+fn flushed(x: f32) -> f32 {
+    // A number that is not one stays, so that the frame sees it.
+    if x.abs() < FLUSH_BELOW { 0.0 } else { x }
+}
+
+/// Solves `F D F^T x = b` in place for x, y and z together. Shape: `[T]`, solver order; zero where there is no node.
+pub(crate) fn substitute(factor: &Factor<'_>, x: &mut [Block]) {
+    for column in 0..x.len() {
+        let own = x[column].map(|lane| lane.map(flushed));
+        x[column] = own;
+        if own == [[0.0; 4]; BLOCK] {
             continue;
         }
-        let column = factor.offsets[j] as usize..factor.offsets[j + 1] as usize;
-        for (&i, &value) in factor.rows[column.clone()].iter().zip(&factor.values[column]) {
-            let row = &mut b[i as usize];
-            for c in 0..3 {
-                row[c] -= value * x[c];
-            }
-        }
-    }
-    for j in (0..b.len()).rev() {
-        let mut x = b[j].map(|x| x * factor.inverse_pivots[j]);
-        let column = factor.offsets[j] as usize..factor.offsets[j + 1] as usize;
-        for (&i, &value) in factor.rows[column.clone()].iter().zip(&factor.values[column]) {
-            let row = &b[i as usize];
-            for c in 0..3 {
-                x[c] -= value * row[c];
-            }
-        }
-        b[j] = x;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use std::vec::Vec;
-
-    use super::*;
-    use crate::fixture::{Grid, factorise};
-    use crate::simd::scalar::naive::{Noise, largest_difference};
-
-    /// Roundings of a sum of six products near one.
-    const SUM_TOLERANCE: f64 = 5e-6;
-    /// f32 substitution on a factor of condition about 1e2.
-    const SOLVE_TOLERANCE: f64 = 2e-5;
-
-    #[test]
-    fn right_hand_side_equals_the_naive_sum() {
-        let grid = Grid::new(4, 3);
-        let mut noise = Noise::new(6);
-        let d: Vec<Features> = (0..grid.vertex_count()).map(|_| noise.features()).collect();
-        let mut b = std::vec![[9.0; 3]; grid.vertex_count()];
-        right_hand_side(&grid.rings(), &grid.rest, &d, &mut b);
-
-        let mut expected = std::vec![[0.0_f64; 3]; grid.vertex_count()];
-        for (i, j, weight) in grid.edges_both_ways() {
-            for row in 0..3 {
-                for c in 0..3 {
-                    let mean = 0.5 * (f64::from(d[i][3 * row + c]) + f64::from(d[j][3 * row + c]));
-                    let edge = f64::from(grid.rest[i][c]) - f64::from(grid.rest[j][c]);
-                    expected[i][row] += f64::from(weight) * mean * edge;
+        for (row, tile) in factor.column(column) {
+            for (lane, entries) in x[row].iter_mut().zip(tile.as_chunks::<BLOCK>().0) {
+                for (value, other) in entries.iter().zip(&own) {
+                    for c in 0..4 {
+                        lane[c] -= value * other[c];
+                    }
                 }
             }
         }
-        assert!(largest_difference(&b, &expected) < SUM_TOLERANCE);
     }
-
-    #[test]
-    fn tiny_right_hand_sides_are_flushed() {
-        let grid = Grid::new(2, 2);
-        let mut b = std::vec![[9.0; 3]; 4];
-        right_hand_side(&grid.rings(), &grid.rest, &[[1e-30; 9]; 4], &mut b);
-        assert_eq!(b, [[0.0; 3]; 4]);
-    }
-
-    #[test]
-    fn substitution_solves_the_dense_system() {
-        let grid = Grid::new(6, 5);
-        let matrix = grid.laplacian();
-        let factor = factorise(&matrix);
-        let mut noise = Noise::new(7);
-        let solution: Vec<[f64; 3]> = (0..grid.vertex_count()).map(|_| noise.point().map(f64::from)).collect();
-        let mut b: Vec<[f32; 3]> = matrix
+    for column in (0..x.len()).rev() {
+        let mut own = [[0.0; 4]; BLOCK];
+        for (entries, other) in factor.inverse_diagonals[column]
+            .as_chunks::<BLOCK>()
+            .0
             .iter()
-            .map(|row| core::array::from_fn(|c| row.iter().zip(&solution).map(|(a, x)| a * x[c]).sum::<f64>() as f32))
-            .collect();
-        substitute(&factor.view(), &mut b);
-        assert!(largest_difference(&b, &solution) < SOLVE_TOLERANCE);
+            .zip(&x[column])
+        {
+            add_scaled(&mut own, entries, other, 1.0);
+        }
+        for (row, tile) in factor.column(column) {
+            for (entries, other) in tile.as_chunks::<BLOCK>().0.iter().zip(&x[row]) {
+                add_scaled(&mut own, entries, other, -1.0);
+            }
+        }
+        x[column] = own.map(|lane| lane.map(flushed));
     }
+}
 
-    #[test]
-    fn a_uniform_gradient_is_an_affine_map() {
-        let grid = Grid::new(5, 5);
-        let factor = factorise(&grid.laplacian());
-        let d = [0.1, -0.2, 0.0, 0.3, 0.05, 0.1, 0.0, 0.2, -0.1];
-        let mut b = std::vec![[0.0; 3]; grid.vertex_count()];
-        right_hand_side(&grid.rings(), &grid.rest, &std::vec![d; grid.vertex_count()], &mut b);
-        substitute(&factor.view(), &mut b);
-        let anchor = grid.rest[grid.anchor];
-        let expected: Vec<[f64; 3]> = grid
-            .rest
-            .iter()
-            .map(|r| {
-                core::array::from_fn(|row| {
-                    (0..3)
-                        .map(|c| f64::from(d[3 * row + c]) * f64::from(r[c] - anchor[c]))
-                        .sum::<f64>()
-                })
-            })
-            .collect();
-        assert!(largest_difference(&b, &expected) < SOLVE_TOLERANCE);
+/// `block_c += sign * entries_c * other`.
+fn add_scaled(block: &mut Block, entries: &[f32; BLOCK], other: &Lane, sign: f32) {
+    for (lane, value) in block.iter_mut().zip(entries) {
+        for c in 0..4 {
+            lane[c] += sign * value * other[c];
+        }
+    }
+}
+
+/// The row of `F^-1` transposed that belongs to a node, times the inverse of D: with `y = F^-1 b`, the solution at `node`
+/// is `sum_n row_n y_n`. Zero but for the node's ancestors in the elimination. Shape: `row` `[4 T]`.
+#[allow(dead_code, reason = "for handles, which linearise the solve at single nodes")]
+pub(crate) fn adjoint_row(factor: &Factor<'_>, node: usize, row: &mut [f32]) {
+    let (blocks, _) = row.as_chunks_mut::<BLOCK>();
+    blocks.fill([0.0; BLOCK]);
+    blocks[node / BLOCK][node % BLOCK] = 1.0;
+    for column in node / BLOCK..blocks.len() {
+        let own = blocks[column].map(flushed);
+        let product = |tile: &[f32; 16]| -> [f32; BLOCK] {
+            let rows = tile.as_chunks::<BLOCK>().0;
+            core::array::from_fn(|r| rows[r].iter().zip(&own).map(|(value, x)| value * x).sum())
+        };
+        blocks[column] = product(&factor.inverse_diagonals[column]);
+        if own == [0.0; BLOCK] {
+            continue;
+        }
+        for (below, tile) in factor.column(column) {
+            let change = product(tile);
+            for r in 0..BLOCK {
+                blocks[below][r] -= change[r];
+            }
+        }
     }
 }

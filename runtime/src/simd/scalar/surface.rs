@@ -3,16 +3,18 @@
 use libm::sqrtf;
 
 use super::gradient::cross;
+use super::poisson::Lane;
 
 /// Normal of a vertex without area around it: unused, or all its triangles are degenerate.
 pub const FALLBACK_NORMAL: [f32; 3] = [0.0, 0.0, 1.0];
 
-/// `positions[vertex_from_solver[s]] = rest[s] + displacement[s]`. Shape: all `[V]`; `positions` in source order.
+/// `positions[vertex_from_solver[s]] = rest[s] + displacement[s]`. Shape: all `[V]`, `displacement` at least;
+/// `positions` in source order.
 ///
 /// Errors: the first vertex, in solver order, whose position is not finite; then `positions` is only partly written.
 pub(crate) fn scatter(
     rest: &[[f32; 3]],
-    displacement: &[[f32; 3]],
+    displacement: &[Lane],
     vertex_from_solver: &[u32],
     positions: &mut [[f32; 3]],
 ) -> Result<(), u32> {
@@ -72,7 +74,7 @@ mod tests {
     #[test]
     fn scatter_follows_the_permutation() {
         let rest = [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0]];
-        let displacement = [[0.0, 0.5, 0.0]; 3];
+        let displacement = [[0.0, 0.5, 0.0, 0.0]; 3];
         let mut positions = [[0.0; 3]; 3];
         assert_eq!(scatter(&rest, &displacement, &[2, 0, 1], &mut positions), Ok(()));
         assert_eq!(positions, [[2.0, 0.5, 0.0], [3.0, 0.5, 0.0], [1.0, 0.5, 0.0]]);
@@ -81,7 +83,7 @@ mod tests {
     #[test]
     fn scatter_names_the_vertex_that_is_not_finite() {
         for bad in [f32::NAN, f32::INFINITY] {
-            let displacement = [[0.0; 3], [0.0, bad, 0.0]];
+            let displacement = [[0.0; 4], [0.0, bad, 0.0, 0.0]];
             assert_eq!(
                 scatter(&[[0.0; 3]; 2], &displacement, &[1, 0], &mut [[0.0; 3]; 2]),
                 Err(0)

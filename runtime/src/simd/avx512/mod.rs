@@ -1,0 +1,3 @@
+//! AVX-512: sixteen lanes.
+
+pub(crate) mod poisson;
