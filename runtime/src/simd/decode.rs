@@ -5,13 +5,13 @@
 //! and convolution are both linear: only `tanh(bias + sum_k z_k C_k)` is left for the frame. Gradients are kept as
 //! `D = T - I`: rest gives exactly zero, and the solve then works on displacements, which keeps f32 accurate.
 
-use sinew_formats::package::FEATURE_COUNT;
+use sinew_formats::package::{FEATURE_COUNT, GROUP_NODES};
 
 use super::functions::{half_angle, tanh};
-use super::lanes::{GROUP_VERTICES, Lanes};
+use super::lanes::{Gradient, Lanes};
 
 /// Nine numbers of each vertex of a group, number first.
-pub(crate) type Group<T> = [[T; GROUP_VERTICES]; FEATURE_COUNT];
+pub(crate) type Group<T> = [[T; GROUP_NODES]; FEATURE_COUNT];
 /// Nine vectors.
 type Row<L> = [L; FEATURE_COUNT];
 /// Row-major 3x3 of vectors.
@@ -66,8 +66,10 @@ pub(crate) struct Decoder<'a> {
     /// Shape: `[B]`.
     pub(crate) blocks: &'a [BlockRest],
     pub(crate) scales: FeatureScales,
-    /// Where the gradients of each vertex go. Shape: `[V]`; `G = ceil(V / GROUP_VERTICES)`.
+    /// Where the gradient of each lane goes. Shape: `[N]`; `G = ceil(N / GROUP_NODES)`.
     pub(crate) places: &'a [u32],
+    /// Also decodes what no changed component touches.
+    pub(crate) all: bool,
 }
 
 /// Fills in the activations of the biases.
@@ -75,7 +77,7 @@ pub(crate) struct Decoder<'a> {
 pub(crate) fn rest_activations<L: Lanes>(blocks: &mut [BlockRest]) {
     for block in blocks {
         for c in 0..FEATURE_COUNT {
-            let mut lanes = [0.0; GROUP_VERTICES];
+            let mut lanes = [0.0; GROUP_NODES];
             tanh(L::splat(block.bias[c])).store(&mut lanes);
             block.activation[c] = lanes[0];
         }
@@ -84,25 +86,83 @@ pub(crate) fn rest_activations<L: Lanes>(blocks: &mut [BlockRest]) {
 
 /// Features and gradients of the groups that a changed component touches; the others stay.
 ///
-/// Shape: `features` `[G]`; `gradients` as `places` say.
+/// Shape: `features` `[G]`, `gradients` `[N]`, solver order.
 #[inline(always)]
-pub(crate) fn decode<L: Lanes>(decoder: &Decoder<'_>, features: &mut [Group<f32>], gradients: &mut [[f32; 4]]) {
-    for (g, features) in features.iter_mut().enumerate() {
+pub(crate) fn decode<L: Lanes>(decoder: &Decoder<'_>, features: &mut [Group<f32>], gradients: &mut [Gradient]) {
+    for (g, (features, places)) in features.iter_mut().zip(decoder.places.chunks(GROUP_NODES)).enumerate() {
         let tiles = decoder.tiles.of(g);
         let changed = |owner: &[u16; 2]| decoder.shares[owner[0] as usize].changed != 0;
-        if !decoder.tiles.owners[tiles.clone()].iter().any(changed) {
+        if !decoder.all && !decoder.tiles.owners[tiles.clone()].iter().any(changed) {
             continue;
         }
-        let places = &decoder.places[g * GROUP_VERTICES..decoder.places.len().min((g + 1) * GROUP_VERTICES)];
         for lane in (0..places.len()).step_by(L::COUNT) {
             let x = blend::<L>(decoder, tiles.clone(), lane);
             for c in 0..FEATURE_COUNT {
                 x[c].store(&mut features[c][lane..]);
             }
-            let places = &places[lane..places.len().min(lane + L::COUNT)];
-            scatter(&gradient(decoder.scales, &x), places, gradients);
+            scatter(&gradient(decoder.scales, &x), part::<L>(places, lane), gradients);
         }
     }
+}
+
+/// Gradients of one group of features, to `places`.
+#[inline(always)]
+pub(crate) fn gradients<L: Lanes>(
+    scales: FeatureScales,
+    features: &Group<f32>,
+    places: &[u32],
+    gradients: &mut [Gradient],
+) {
+    for lane in (0..places.len()).step_by(L::COUNT) {
+        let x = features.each_ref().map(|row| L::load(&row[lane..]));
+        scatter(&gradient(scales, &x), part::<L>(places, lane), gradients);
+    }
+}
+
+/// Derivatives of all gradients along component `k`, at the pose whose features these are.
+///
+/// `dx = (1 - tanh^2(bias + u)) C_k` where the component reaches, `dT = [J_l(r) dr]x R S + R dS`.
+#[inline(always)]
+pub(crate) fn tangents<L: Lanes>(
+    decoder: &Decoder<'_>,
+    k: usize,
+    scale: f32,
+    features: &[Group<f32>],
+    gradients: &mut [Gradient],
+) {
+    for (g, (features, places)) in features.iter().zip(decoder.places.chunks(GROUP_NODES)).enumerate() {
+        let tiles = decoder.tiles.of(g);
+        let owners = &decoder.tiles.owners[tiles.clone()];
+        let Some(own) = owners.iter().position(|owner| owner[0] as usize == k) else {
+            for &place in places {
+                gradients[place as usize] = [[0.0; 4]; 3];
+            }
+            continue;
+        };
+        let b = owners[own][1];
+        let block = owners.iter().position(|owner| owner[1] == b).unwrap_or(own);
+        let values = &decoder.tiles.values[tiles.start + own];
+        for lane in (0..places.len()).step_by(L::COUNT) {
+            let (u, _) = block_blend::<L>(decoder, tiles.start + block..tiles.end, lane);
+            let dx: Row<L> = core::array::from_fn(|c| {
+                let y = tanh(u[c]);
+                let slope = y.neg_mul_add(y, L::splat(1.0)).mul(L::splat(scale));
+                slope.mul(L::load_halves(&values[c][lane..]))
+            });
+            let x = features.each_ref().map(|row| L::load(&row[lane..]));
+            scatter(
+                &gradient_tangent(decoder.scales, &x, &dx),
+                part::<L>(places, lane),
+                gradients,
+            );
+        }
+    }
+}
+
+/// The places of the lanes from `lane` on.
+#[inline(always)]
+fn part<L: Lanes>(places: &[u32], lane: usize) -> &[u32] {
+    &places[lane..places.len().min(lane + L::COUNT)]
 }
 
 impl Tiles<'_> {
@@ -117,33 +177,47 @@ impl Tiles<'_> {
 #[inline(always)]
 fn blend<L: Lanes>(decoder: &Decoder<'_>, tiles: core::ops::Range<usize>, lane: usize) -> Row<L> {
     let mut x = [L::splat(0.0); FEATURE_COUNT];
-    let owners = &decoder.tiles.owners[tiles.clone()];
-    let values = &decoder.tiles.values[tiles];
-    let mut t = 0;
-    while t < owners.len() {
-        let b = owners[t][1];
-        let block = &decoder.blocks[b as usize];
-        let mut u = block.bias.map(L::splat);
-        let mut moved = false;
-        while t < owners.len() && owners[t][1] == b {
-            let factor = decoder.shares[owners[t][0] as usize].factor;
-            if factor != 0.0 {
-                moved = true;
-                let factor = L::splat(factor);
-                for c in 0..FEATURE_COUNT {
-                    u[c] = L::load_halves(&values[t][c][lane..]).mul_add(factor, u[c]);
-                }
-            }
-            t += 1;
-        }
+    let mut t = tiles.start;
+    while t < tiles.end {
+        let b = decoder.tiles.owners[t][1];
+        let (u, end) = block_blend::<L>(decoder, t..tiles.end, lane);
         // A block at rest adds nothing.
-        if moved {
+        if decoder.tiles.owners[t..end]
+            .iter()
+            .any(|owner| decoder.shares[owner[0] as usize].factor != 0.0)
+        {
+            let rest = &decoder.blocks[b as usize].activation;
             for c in 0..FEATURE_COUNT {
-                x[c] = x[c].add(tanh(u[c]).sub(L::splat(block.activation[c])));
+                x[c] = x[c].add(tanh(u[c]).sub(L::splat(rest[c])));
             }
         }
+        t = end;
     }
     x
+}
+
+/// `bias + sum_k z_k C_k` of the block that the first tile belongs to, and where its tiles end.
+#[inline(always)]
+fn block_blend<L: Lanes>(decoder: &Decoder<'_>, tiles: core::ops::Range<usize>, lane: usize) -> (Row<L>, usize) {
+    let owners = &decoder.tiles.owners[tiles.clone()];
+    let values = &decoder.tiles.values[tiles.clone()];
+    let b = owners[0][1];
+    let mut u = decoder.blocks[b as usize].bias.map(L::splat);
+    let mut count = 0;
+    for (owner, values) in owners.iter().zip(values) {
+        if owner[1] != b {
+            break;
+        }
+        let factor = decoder.shares[owner[0] as usize].factor;
+        if factor != 0.0 {
+            let factor = L::splat(factor);
+            for c in 0..FEATURE_COUNT {
+                u[c] = L::load_halves(&values[c][lane..]).mul_add(factor, u[c]);
+            }
+        }
+        count += 1;
+    }
+    (u, tiles.start + count)
 }
 
 /// `D = exp([r]x) S - I` by rows.
@@ -154,9 +228,62 @@ fn gradient<L: Lanes>(scales: FeatureScales, x: &Row<L>) -> Row<L> {
     // (I + E)(I + P) - I = E + P + E P: no difference of near-equal numbers.
     core::array::from_fn(|n| {
         let (i, j) = (n / 3, n % 3);
-        let sum = e[i][j].add(p[i][j]);
-        e[i][2].mul_add(p[2][j], e[i][1].mul_add(p[1][j], e[i][0].mul_add(p[0][j], sum)))
+        e[i][j].add(p[i][j]).add(product(&e, &p, i, j))
     })
+}
+
+/// Derivative of the gradient when the features move along `dx`, by rows.
+#[inline(always)]
+fn gradient_tangent<L: Lanes>(scales: FeatureScales, x: &Row<L>, dx: &Row<L>) -> Row<L> {
+    let r = log_rotation(scales, x);
+    let (e, turn) = rotation_less_identity(&r);
+    let w = left_jacobian(&r, &log_rotation(scales, dx), &turn);
+    let (rotation, stretch) = (plus_identity(e), plus_identity(stretch_less_identity(scales, x)));
+    let deformation: Matrix<L> = core::array::from_fn(|i| core::array::from_fn(|j| product(&rotation, &stretch, i, j)));
+    let stretched = stretch_less_identity(scales, dx);
+    let turned = |i: usize, j: usize| {
+        let (a, b) = ((i + 1) % 3, (i + 2) % 3);
+        w[a].mul(deformation[b][j]).sub(w[b].mul(deformation[a][j]))
+    };
+    core::array::from_fn(|n| turned(n / 3, n % 3).add(product(&rotation, &stretched, n / 3, n % 3)))
+}
+
+/// `J_l(r) dr`: the angular velocity, in the deformed frame, of `exp([r + t dr]x)`.
+///
+/// `J_l = a I + b [r]x + c r r^T` with `a = sin t / t`, `b = (1 - cos t) / t^2` and `c = (t - sin t) / t^3`.
+#[inline(always)]
+fn left_jacobian<L: Lanes>(r: &[L; 3], dr: &[L; 3], turn: &HalfTurn<L>) -> [L; 3] {
+    /// Below this squared angle a series: the closed form cancels.
+    const SERIES_ANGLE_SQUARED: f32 = 1.0;
+    let twice = turn.sine.add(turn.sine);
+    let (a, b) = (twice.mul(turn.cosine), twice.mul(turn.sine));
+    let t = turn.angle_squared;
+    let series = [1.0 / 362_880.0, -1.0 / 5040.0, 1.0 / 120.0, -1.0 / 6.0];
+    let series = series
+        .into_iter()
+        .fold(L::splat(0.0), |sum, term| sum.mul_add(t, L::splat(term)));
+    let closed = L::splat(1.0).sub(a).div(t);
+    let c = t.select_below(L::splat(SERIES_ANGLE_SQUARED), L::splat(0.0).sub(series), closed);
+    let along = c.mul(dot(r, dr));
+    core::array::from_fn(|i| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        let across = r[j].mul(dr[k]).sub(r[k].mul(dr[j]));
+        along.mul_add(r[i], b.mul_add(across, a.mul(dr[i])))
+    })
+}
+
+/// One entry of `A B`.
+#[inline(always)]
+fn product<L: Lanes>(a: &Matrix<L>, b: &Matrix<L>, i: usize, j: usize) -> L {
+    a[i][2].mul_add(b[2][j], a[i][1].mul_add(b[1][j], a[i][0].mul(b[0][j])))
+}
+
+#[inline(always)]
+fn plus_identity<L: Lanes>(mut a: Matrix<L>) -> Matrix<L> {
+    for i in 0..3 {
+        a[i][i] = a[i][i].add(L::splat(1.0));
+    }
+    a
 }
 
 #[inline(always)]
@@ -211,11 +338,11 @@ fn dot<L: Lanes>(a: &[L; 3], b: &[L; 3]) -> L {
     a[2].mul_add(b[2], a[1].mul_add(b[1], a[0].mul(b[0])))
 }
 
-/// Gradients to their vertices: three columns of four numbers each, the last one zero.
+/// Gradients to their places, by columns.
 #[inline(always)]
-fn scatter<L: Lanes>(d: &Row<L>, places: &[u32], gradients: &mut [[f32; 4]]) {
+fn scatter<L: Lanes>(d: &Row<L>, places: &[u32], gradients: &mut [Gradient]) {
     for column in 0..3 {
         let rows = [d[column], d[3 + column], d[6 + column], L::splat(0.0)];
-        L::scatter(rows, places, 3, column, gradients);
+        L::scatter(rows, places, column, gradients);
     }
 }

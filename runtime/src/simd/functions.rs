@@ -6,7 +6,9 @@
 
 use libm::{cosf, sinf};
 
-use super::lanes::{GROUP_VERTICES, Lanes};
+use sinew_formats::package::GROUP_NODES;
+
+use super::lanes::Lanes;
 
 /// Arguments beyond have the value at this one, which differs from 1 by less than [`TANH_TOLERANCE`].
 const TANH_END: f32 = 8.0;
@@ -24,10 +26,7 @@ pub(crate) const TANH_TOLERANCE: f64 = 4e-7;
 pub(crate) fn tanh<L: Lanes>(x: L) -> L {
     let x = x.min(L::splat(TANH_END)).max(L::splat(-TANH_END));
     let square = x.mul(x);
-    let [p, q] = [
-        x.mul(polynomial(square, &TANH_P)),
-        polynomial(square, &TANH_Q),
-    ];
+    let [p, q] = [x.mul(polynomial(square, &TANH_P)), polynomial(square, &TANH_Q)];
     p.quotient(q)
 }
 
@@ -50,7 +49,13 @@ const ROUNDER: f32 = 12_582_912.0;
 /// `sin y / y` in y^2, |y| <= pi/2, to 5e-9.
 const SINE: [f32; 5] = [1.0, -0.166_666_58, 0.008_333_05, -1.980_900_5e-4, 2.605_078_3e-6];
 /// `cos y` in y^2, |y| <= pi/2, to 5e-8.
-const COSINE: [f32; 5] = [0.999_999_95, -0.499_999_05, 0.041_663_57, -0.001_385_361_6, 2.315_209_7e-5];
+const COSINE: [f32; 5] = [
+    0.999_999_95,
+    -0.499_999_05,
+    0.041_663_57,
+    -0.001_385_361_6,
+    2.315_209_7e-5,
+];
 
 /// For the angle t: `sin(t/2) / t` and `cos(t/2)`, both times one sign, which no product of two of them sees.
 ///
@@ -77,11 +82,11 @@ pub(crate) fn half_angle<L: Lanes>(t: L) -> [L; 2] {
 #[cold]
 #[inline(never)]
 fn beyond_reduction<L: Lanes>(t: L, reduced: [L; 2]) -> [L; 2] {
-    let mut angles = [0.0; GROUP_VERTICES];
+    let mut angles = [0.0; GROUP_NODES];
     t.store(&mut angles);
     let library: [fn(f32) -> f32; 2] = [|t| sinf(0.5 * t) / t, |t| cosf(0.5 * t)];
     core::array::from_fn(|n| {
-        let mut lanes = [0.0; GROUP_VERTICES];
+        let mut lanes = [0.0; GROUP_NODES];
         reduced[n].store(&mut lanes);
         for (value, &t) in lanes.iter_mut().zip(&angles[..L::COUNT]) {
             // Not a number takes this way too.

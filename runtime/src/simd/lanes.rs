@@ -6,12 +6,15 @@
 use half::f16;
 use libm::sqrtf;
 
-/// Vertices of a group, which is what a kernel takes at a time: a multiple of every lane count.
-pub(crate) use sinew_formats::package::GROUP_VERTICES;
+use sinew_formats::package::GROUP_NODES;
+
+/// A deformation gradient less identity, `D = T - I`, as the right-hand side reads it: three columns, each filled up with
+/// a zero.
+pub(crate) type Gradient = [[f32; 4]; 3];
 
 /// A vector of f32. All operations are by lane and round as IEEE 754 says.
 pub(crate) trait Lanes: Copy {
-    /// Lanes; divides [`GROUP_VERTICES`].
+    /// Lanes; divides [`GROUP_NODES`].
     const COUNT: usize;
 
     fn splat(value: f32) -> Self;
@@ -42,14 +45,14 @@ pub(crate) trait Lanes: Copy {
     fn select_below(self, limit: Self, yes: Self, no: Self) -> Self;
     /// Whether every lane is at most `limit`; not where one is NaN.
     fn all_at_most(self, limit: f32) -> bool;
-    /// Lane n of the rows to `target[index[n]]`, for as many lanes as `index` has, at most all.
-    fn scatter(rows: [Self; 4], index: &[u32], stride: usize, offset: usize, target: &mut [[f32; 4]]) {
-        let mut lanes = [[0.0; GROUP_VERTICES]; 4];
+    /// Lane n of the rows to column `column` of `target[places[n]]`, for the places there are, at most all lanes.
+    fn scatter(rows: [Self; 4], places: &[u32], column: usize, target: &mut [Gradient]) {
+        let mut lanes = [[0.0; GROUP_NODES]; 4];
         for (row, lanes) in rows.into_iter().zip(&mut lanes) {
             row.store(lanes);
         }
-        for (n, &place) in index.iter().enumerate() {
-            target[place as usize * stride + offset] = [lanes[0][n], lanes[1][n], lanes[2][n], lanes[3][n]];
+        for (n, &place) in places.iter().enumerate() {
+            target[place as usize][column] = lanes.map(|row| row[n]);
         }
     }
 }

@@ -3,7 +3,7 @@
 
 use core::arch::x86_64::*;
 
-use crate::simd::lanes::Lanes;
+use crate::simd::lanes::{Gradient, Lanes};
 
 /// One register.
 #[derive(Clone, Copy, Debug)]
@@ -81,9 +81,18 @@ impl Lanes for Sixteen {
         unsafe { _mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, _mm512_set1_ps(limit)) == u16::MAX }
     }
     #[inline(always)]
-    fn scatter(rows: [Self; 4], index: &[u32], stride: usize, offset: usize, target: &mut [[f32; 4]]) {
+    fn quotient(self, other: Self) -> Self {
+        // Fourteen digits and one step of Newton's.
+        unsafe {
+            let guess = _mm512_rcp14_ps(other.0);
+            let lack = _mm512_fnmadd_ps(other.0, guess, _mm512_set1_ps(1.0));
+            Self(_mm512_mul_ps(self.0, _mm512_fmadd_ps(guess, lack, guess)))
+        }
+    }
+    #[inline(always)]
+    fn scatter(rows: [Self; 4], places: &[u32], column: usize, target: &mut [Gradient]) {
         let [a, b, c, d] = rows.map(|row| row.0);
-        // Four 4x4 transposes at once: vertex 4 n + i is quarter n of quad i.
+        // Four 4x4 transposes at once: lane 4 n + i is quarter n of quad i.
         let quads = unsafe {
             let [ab, cd] = [_mm512_unpacklo_ps(a, b), _mm512_unpacklo_ps(c, d)];
             let [ab_high, cd_high] = [_mm512_unpackhi_ps(a, b), _mm512_unpackhi_ps(c, d)];
@@ -94,27 +103,18 @@ impl Lanes for Sixteen {
                 _mm512_shuffle_ps::<0xee>(ab_high, cd_high),
             ]
         };
-        let place = |n: usize| index[n] as usize * stride + offset;
-        if let Some(index) = index.first_chunk::<16>() {
-            let mut store = |n: usize, quarter: __m128| {
-                let target = &mut target[index[n] as usize * stride + offset];
-                unsafe { _mm_storeu_ps(target.as_mut_ptr(), quarter) }
-            };
-            for i in 0..4 {
-                unsafe {
-                    store(i, _mm512_castps512_ps128(quads[i]));
-                    store(4 + i, _mm512_extractf32x4_ps::<1>(quads[i]));
-                    store(8 + i, _mm512_extractf32x4_ps::<2>(quads[i]));
-                    store(12 + i, _mm512_extractf32x4_ps::<3>(quads[i]));
-                }
+        let mut store = |lane: usize, quarter: __m128| {
+            if let Some(&place) = places.get(lane) {
+                let column = &mut target[place as usize][column];
+                unsafe { _mm_storeu_ps(column.as_mut_ptr(), quarter) }
             }
-        } else {
-            let mut lanes = [[0.0; 16]; 4];
-            for (quad, lanes) in quads.into_iter().zip(&mut lanes) {
-                unsafe { _mm512_storeu_ps(lanes.as_mut_ptr(), quad) }
-            }
-            for n in 0..index.len() {
-                target[place(n)].copy_from_slice(&lanes[n % 4][n / 4 * 4..][..4]);
+        };
+        for (i, quad) in quads.into_iter().enumerate() {
+            unsafe {
+                store(i, _mm512_castps512_ps128(quad));
+                store(4 + i, _mm512_extractf32x4_ps::<1>(quad));
+                store(8 + i, _mm512_extractf32x4_ps::<2>(quad));
+                store(12 + i, _mm512_extractf32x4_ps::<3>(quad));
             }
         }
     }
