@@ -3,6 +3,9 @@
 #![allow(unsafe_code)]
 
 mod lanes;
+mod surface;
+
+pub(crate) use surface::normals;
 
 use super::decode::{BlockRest, Decoder, FeatureScales, Group};
 use super::lanes::Gradient;
@@ -27,6 +30,7 @@ macro_rules! kernel {
 }
 
 kernel!(rest_activations(blocks: &mut [BlockRest]));
-kernel!(decode(decoder: &Decoder<'_>, features: &mut [Group<f32>], gradients: &mut [Gradient]));
+kernel!(decode(decoder: &Decoder<'_>, gradients: &mut [Gradient]));
+kernel!(features(decoder: &Decoder<'_>, g: usize, features: &mut Group<f32>));
 kernel!(gradients(scales: FeatureScales, features: &Group<f32>, places: &[u32], gradients: &mut [Gradient]));
-kernel!(tangents(decoder: &Decoder<'_>, k: usize, scale: f32, features: &[Group<f32>], gradients: &mut [Gradient]));
+kernel!(tangents(decoder: &Decoder<'_>, k: usize, scale: f32, gradients: &mut [Gradient]));
