@@ -6,7 +6,7 @@ use sinew_formats::package::{BakedBlock, BakedView, NONE, OpenError, TierView};
 
 use crate::simd::decode::{FeatureScales, Patches};
 use crate::simd::scalar::poisson::{Factor, Rings};
-use crate::simd::scalar::surface::{Around, Places};
+use crate::simd::scalar::surface::{Around, Orders};
 
 /// A baked package, checked. Borrows the bytes; cheap to copy; may be shared between threads, each with its own workspace.
 #[derive(Clone, Copy)]
@@ -109,19 +109,19 @@ impl<'a> Basis<'a> {
         self.view.faces()
     }
 
-    /// Rest shape. Shape: `[V]`, **solver** order, units of the source.
+    /// Rest shape. Shape: `[V]`, in **lanes**: the order in which the frame path runs; units of the source.
     pub fn rest_positions(&self) -> &'a [[f32; 3]] {
         self.view.exact().rest_positions()
     }
 
-    /// Where a source vertex stands in solver order. Shape: `[V]`.
-    pub fn solver_from_vertex(&self) -> &'a [u32] {
-        self.view.solver_from_vertex()
+    /// Lane of each source vertex. Shape: `[V]`.
+    pub fn lane_from_vertex(&self) -> &'a [u32] {
+        self.view.lane_from_vertex()
     }
 
-    /// Source vertex of each solver index. Shape: `[V]`.
-    pub fn vertex_from_solver(&self) -> &'a [u32] {
-        self.view.vertex_from_solver()
+    /// Source vertex of each lane. Shape: `[V]`.
+    pub fn vertex_from_lane(&self) -> &'a [u32] {
+        self.view.vertex_from_lane()
     }
 
     /// Radians a network unit of log-rotation.
@@ -139,24 +139,16 @@ impl<'a> Basis<'a> {
         Around {
             offsets: self.view.fan_offsets(),
             fans: self.view.fans(),
+            vertex_from_lane: self.view.vertex_from_lane(),
+        }
+    }
+
+    /// The orders of the exact tier.
+    pub(crate) fn orders(&self) -> Orders<'a> {
+        Orders {
             solver_from_lane: self.view.exact().solver_from_lane(),
-            vertex_from_solver: self.view.vertex_from_solver(),
+            vertex_from_lane: self.view.vertex_from_lane(),
         }
-    }
-
-    /// Where the exact tier's nodes go.
-    pub(crate) fn places(&self) -> Places<'a> {
-        Places {
-            vertex_from_solver: self.view.vertex_from_solver(),
-            lane_from_solver: self.view.exact().lane_from_solver(),
-        }
-    }
-
-    /// Lanes of the exact tier in source order. Shape: `[V]`.
-    pub(crate) fn lanes(&self) -> impl ExactSizeIterator<Item = usize> + use<'a> {
-        let lane_from_solver = self.view.exact().lane_from_solver();
-        let solvers = self.view.solver_from_vertex().iter();
-        solvers.map(move |&solver| lane_from_solver[solver as usize] as usize)
     }
 
     /// The tier whose nodes are the vertices.
@@ -181,10 +173,6 @@ impl<'a> Tier<'a> {
         self.nodes.node_count()
     }
 
-    pub(crate) fn block_count(&self) -> usize {
-        self.basis.block_count()
-    }
-
     pub(crate) fn block(&self, b: usize) -> BakedBlock {
         self.basis.view.block(b)
     }
@@ -197,7 +185,7 @@ impl<'a> Tier<'a> {
         }
     }
 
-    /// Rest shape of the nodes. Shape: `[N]`, solver order.
+    /// Rest shape of the nodes. Shape: `[N]`, lanes.
     pub(crate) fn rest_positions(&self) -> &'a [[f32; 3]] {
         self.nodes.rest_positions()
     }
@@ -205,16 +193,6 @@ impl<'a> Tier<'a> {
     /// Multiplies the halves of component `k`.
     pub(crate) fn value_scale(&self, k: usize) -> f32 {
         self.basis.view.component(k).value_scale
-    }
-
-    /// Solver index of each lane. Shape: `[N]`.
-    pub(crate) fn solver_from_lane(&self) -> &'a [u32] {
-        self.nodes.solver_from_lane()
-    }
-
-    /// Lane of each solver index. Shape: `[N]`.
-    pub(crate) fn lane_from_solver(&self) -> &'a [u32] {
-        self.nodes.lane_from_solver()
     }
 
     /// The components.
@@ -231,6 +209,7 @@ impl<'a> Tier<'a> {
             offsets: self.nodes.ring_offsets(),
             neighbours: self.nodes.ring(),
             weights: self.nodes.ring_weights(),
+            solver_from_lane: self.nodes.solver_from_lane(),
         }
     }
 

@@ -21,7 +21,7 @@ pub(crate) struct Decoded<'p> {
     pub(crate) shares: &'p mut [Share],
     /// Shape: `[B]`.
     pub(crate) blocks: &'p [BlockRest],
-    /// Shape: `[N]`, solver order.
+    /// Shape: `[N]`, lanes.
     pub(crate) gradients: &'p mut [Gradient],
 }
 
@@ -46,7 +46,6 @@ pub(crate) fn decoder<'a>(tier: &Tier<'a>, shares: &'a [Share], blocks: &'a [Blo
         shares,
         blocks,
         scales: tier.scales(),
-        places: tier.solver_from_lane(),
         all,
     }
 }

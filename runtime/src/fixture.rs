@@ -15,11 +15,13 @@ use crate::simd::scalar::naive::Noise;
 use crate::simd::scalar::poisson::{Factor, Rings};
 use crate::workspace::{Workspace, WorkspaceLayout};
 
-/// A bumpy grid of triangles in a scrambled solver order, every edge of another weight.
+/// A bumpy grid of triangles in scrambled lanes and another order of elimination, every edge of another weight.
 pub(crate) struct Grid {
     pub(crate) rest: Vec<[f32; 3]>,
     pub(crate) faces: Vec<[u32; 3]>,
-    pub(crate) solver_from_vertex: Vec<u32>,
+    pub(crate) lane_from_vertex: Vec<u32>,
+    pub(crate) solver_from_lane: Vec<u32>,
+    /// A lane.
     pub(crate) anchor: usize,
     offsets: Vec<u32>,
     ring: Vec<u32>,
@@ -30,7 +32,7 @@ impl Grid {
     pub(crate) fn new(width: u32, height: u32) -> Self {
         let count = width * height;
         let stride = (2..).find(|n| gcd(*n, count) == 1).unwrap();
-        let solver_from_vertex: Vec<u32> = (0..count).map(|v| (v * stride + 1) % count).collect();
+        let lane_from_vertex: Vec<u32> = (0..count).map(|v| (v * stride + 1) % count).collect();
         let mut noise = Noise::new(100);
         let mut rest = vec![[0.0; 3]; count as usize];
         let mut faces = Vec::new();
@@ -38,7 +40,7 @@ impl Grid {
         for y in 0..height {
             for x in 0..width {
                 let v = y * width + x;
-                rest[solver_from_vertex[v as usize] as usize] = [x as f32, y as f32, 0.3 * noise.next()];
+                rest[lane_from_vertex[v as usize] as usize] = [x as f32, y as f32, 0.3 * noise.next()];
                 if x + 1 < width && y + 1 < height {
                     faces.push([v, v + 1, v + width]);
                     faces.push([v + 1, v + width + 1, v + width]);
@@ -47,10 +49,7 @@ impl Grid {
         }
         for face in &faces {
             for (a, b) in [(0, 1), (1, 2), (2, 0)] {
-                let (i, j) = (
-                    solver_from_vertex[face[a] as usize],
-                    solver_from_vertex[face[b] as usize],
-                );
+                let (i, j) = (lane_from_vertex[face[a] as usize], lane_from_vertex[face[b] as usize]);
                 let weight = 1.0 + 0.5 * noise.next();
                 rows[i as usize].insert(j, weight);
                 rows[j as usize].insert(i, weight);
@@ -66,7 +65,9 @@ impl Grid {
         Self {
             rest,
             faces,
-            solver_from_vertex,
+            lane_from_vertex,
+            // Seven divides no count of a test.
+            solver_from_lane: (0..count).map(|lane| (7 * lane + 3) % count).collect(),
             anchor: count as usize / 2,
             offsets,
             ring,
@@ -83,6 +84,7 @@ impl Grid {
             offsets: &self.offsets,
             neighbours: &self.ring,
             weights: &self.weights,
+            solver_from_lane: &self.solver_from_lane,
         }
     }
 
@@ -94,14 +96,25 @@ impl Grid {
         })
     }
 
-    /// Dense Laplacian with the anchor's penalty.
+    /// Rows in lanes to rows in solver order.
+    pub(crate) fn in_solver_order<T: Copy>(&self, lanes: &[T]) -> Vec<T> {
+        let mut rows = lanes.to_vec();
+        for (&solver, row) in self.solver_from_lane.iter().zip(lanes) {
+            rows[solver as usize] = *row;
+        }
+        rows
+    }
+
+    /// Dense Laplacian with the anchor's penalty, solver order.
     pub(crate) fn laplacian(&self) -> Vec<Vec<f64>> {
         let mut matrix = vec![vec![0.0; self.vertex_count()]; self.vertex_count()];
         for (i, j, weight) in self.edges_both_ways() {
+            let [i, j] = [i, j].map(|lane| self.solver_from_lane[lane] as usize);
             matrix[i][j] -= f64::from(weight);
             matrix[i][i] += f64::from(weight);
         }
-        matrix[self.anchor][self.anchor] += 6.0;
+        let anchor = self.solver_from_lane[self.anchor] as usize;
+        matrix[anchor][anchor] += 6.0;
         matrix
     }
 }
@@ -175,21 +188,17 @@ impl Package {
     fn on(grid: &Grid, seed: u64) -> Self {
         let mut noise = Noise::new(seed);
         let count = grid.vertex_count() as u32;
-        let mut vertex_from_solver = vec![0; count as usize];
-        for (v, &s) in grid.solver_from_vertex.iter().enumerate() {
-            vertex_from_solver[s as usize] = v as u32;
+        let mut vertex_from_lane = vec![0; count as usize];
+        for (v, &s) in grid.lane_from_vertex.iter().enumerate() {
+            vertex_from_lane[s as usize] = v as u32;
         }
         let supports: [Vec<u32>; 3] = [
             (0..count).collect(),
-            (0..count).filter(|s| s % 3 != 1).collect(),
-            (0..count).filter(|s| s % 2 == 0).collect(),
+            (0..count).filter(|lane| lane % 3 != 1).collect(),
+            (0..count).filter(|lane| lane % 2 == 0).collect(),
         ];
         let (mut blocks, mut components) = (Vec::new(), Vec::new());
-        let lane_from_solver: Vec<u32> = (0..count).map(|s| (s * 7 + 3) % count).collect();
-        let mut solver_from_lane = vec![0; count as usize];
-        for (s, &lane) in lane_from_solver.iter().enumerate() {
-            solver_from_lane[lane as usize] = s as u32;
-        }
+        let lane_from_solver = grid.in_solver_order(&(0..count).collect::<Vec<u32>>());
         let mut entries = Vec::new();
         let names: Vec<String> = (0..Self::COMPONENTS).map(|k| format!("c{k}")).collect();
         for (b, (parent, component_count)) in [(NONE, 2), (0, 1), (1, 2)].into_iter().enumerate() {
@@ -204,9 +213,8 @@ impl Package {
                 let k = components.len();
                 for slot in 0..supports[b].len() as u32 {
                     if !(slot as usize + k).is_multiple_of(5) {
-                        let solver = supports[b][slot as usize] as usize;
                         let values = noise.features().map(|x| f16::from_f32(0.125 * x).to_bits());
-                        entries.push((k, b as u32, lane_from_solver[solver], values));
+                        entries.push((k, b as u32, supports[b][slot as usize], values));
                     }
                 }
                 components.push(BakedComponent {
@@ -219,17 +227,13 @@ impl Package {
             }
         }
         let patches = Patches::gather(grid.vertex_count(), entries);
-        let lane = |&s: &u32| lane_from_solver[s as usize];
-        let fans = Fans::gather(
-            &grid.faces,
-            &grid.solver_from_vertex.iter().map(lane).collect::<Vec<_>>(),
-        );
+        let fans = Fans::gather(&grid.faces, &grid.lane_from_vertex);
         let factor = factorise(&grid.laplacian());
         let bytes = write_baked(&BakedBasis {
             compact_id: [7; 16],
             faces: &grid.faces,
-            solver_from_vertex: &grid.solver_from_vertex,
-            vertex_from_solver: &vertex_from_solver,
+            lane_from_vertex: &grid.lane_from_vertex,
+            vertex_from_lane: &vertex_from_lane,
             rotation_scale: 1.5,
             stretch_scale: 0.4,
             blocks: &blocks,
@@ -245,7 +249,7 @@ impl Package {
                 factor_rows: &factor.rows,
                 factor_values: &factor.values,
                 inverse_pivots: &factor.inverse_pivots,
-                solver_from_lane: &solver_from_lane,
+                solver_from_lane: &grid.solver_from_lane,
                 lane_from_solver: &lane_from_solver,
                 patch_offsets: &patches.patch_offsets,
                 patch_owners: &patches.patch_owners,
@@ -254,7 +258,7 @@ impl Package {
             fast: None,
         })
         .unwrap();
-        let rest_in_source_order = grid.solver_from_vertex.iter().map(|&s| grid.rest[s as usize]).collect();
+        let rest_in_source_order = grid.lane_from_vertex.iter().map(|&s| grid.rest[s as usize]).collect();
         Self {
             bytes,
             rest_in_source_order,

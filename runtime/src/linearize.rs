@@ -56,7 +56,9 @@ impl Tangent<'_> {
         workspace.kernels.tangents(&decoder, self.component, scale, gradients);
         let solution = &mut *workspace.solution;
         solve(&tier, gradients, solution);
-        for (d, &v) in solution.iter().zip(self.basis.vertex_from_solver()) {
+        let orders = self.basis.orders();
+        for (&solver, &v) in orders.solver_from_lane.iter().zip(orders.vertex_from_lane) {
+            let d = &solution[solver as usize];
             if !d.iter().all(|x| x.is_finite()) {
                 self.displacement.fill([0.0; 3]);
                 return Err(FrameError::NotFinite { vertex: v as usize });

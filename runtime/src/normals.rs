@@ -34,8 +34,9 @@ impl Normals<'_> {
     /// Those of [`Normals::validate`].
     pub fn run(self, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
         self.validate(workspace)?;
-        for (lane, p) in self.basis.lanes().zip(self.positions) {
-            workspace.posed[lane] = [p[0], p[1], p[2], 0.0];
+        for (posed, &v) in workspace.posed.iter_mut().zip(self.basis.vertex_from_lane()) {
+            let p = self.positions[v as usize];
+            *posed = [p[0], p[1], p[2], 0.0];
         }
         write_normals(self.basis, workspace.kernels, workspace.posed, self.normals);
         Ok(())

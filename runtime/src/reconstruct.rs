@@ -44,18 +44,15 @@ impl Reconstruct<'_> {
         self.validate(workspace)?;
         let tier = self.basis.exact();
         workspace.gradients_are_stale = true;
-        // Vertices stand in groups of their own here: a kernel treats all lanes alike.
-        let places = self.basis.solver_from_vertex().chunks(GROUP_NODES);
-        for (features, places) in self.features.chunks(GROUP_NODES).zip(places) {
+        let vertices = self.basis.vertex_from_lane().chunks(GROUP_NODES);
+        for (vertices, gradients) in vertices.zip(workspace.gradients.chunks_mut(GROUP_NODES)) {
             let mut group = [[0.0; GROUP_NODES]; FEATURE_COUNT];
-            for (n, x) in features.iter().enumerate() {
+            for (n, &v) in vertices.iter().enumerate() {
                 for c in 0..FEATURE_COUNT {
-                    group[c][n] = x[c];
+                    group[c][n] = self.features[v as usize][c];
                 }
             }
-            workspace
-                .kernels
-                .gradients(tier.scales(), &group, places, workspace.gradients);
+            workspace.kernels.gradients(tier.scales(), &group, gradients);
         }
         solve(&tier, workspace.gradients, workspace.solution);
         let (bounds, emitted) = emit(self.basis, workspace.solution, workspace.posed, self.positions);

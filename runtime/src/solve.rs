@@ -6,7 +6,7 @@ use crate::simd::lanes::Gradient;
 use crate::simd::scalar::poisson::{right_hand_side, substitute};
 use crate::simd::scalar::surface::{Bounds, scatter};
 
-/// Solves `L d = b(D)`. Shape: both `[N]`, solver order.
+/// Solves `L d = b(D)`. Shape: both `[N]`; `gradients` in lanes, `displacement` in solver order.
 pub(crate) fn solve(tier: &Tier<'_>, gradients: &[Gradient], displacement: &mut [[f32; 3]]) {
     right_hand_side(&tier.rings(), tier.rest_positions(), gradients, displacement);
     substitute(&tier.factor(), displacement);
@@ -21,16 +21,15 @@ pub(crate) fn emit(
     posed: &mut [[f32; 4]],
     positions: &mut [[f32; 3]],
 ) -> (Bounds, Result<(), FrameError>) {
-    let (rest, places) = (basis.rest_positions(), basis.places());
-    let vertex = match scatter(rest, displacement, places, posed, positions) {
+    let (rest, orders) = (basis.rest_positions(), basis.orders());
+    let vertex = match scatter(rest, displacement, orders, posed, positions) {
         Ok(bounds) => return (bounds, Ok(())),
         Err(vertex) => vertex as usize,
     };
     let mut bounds = Bounds::EMPTY;
-    let targets = places.vertex_from_solver.iter().zip(places.lane_from_solver);
-    for (r, (&v, &lane)) in rest.iter().zip(targets) {
+    for ((r, posed), &v) in rest.iter().zip(posed).zip(orders.vertex_from_lane) {
         positions[v as usize] = *r;
-        posed[lane as usize] = [r[0], r[1], r[2], 0.0];
+        *posed = [r[0], r[1], r[2], 0.0];
         bounds.include(r);
     }
     (bounds, Err(FrameError::NotFinite { vertex }))

@@ -86,7 +86,7 @@ pub struct Workspace<'w> {
     pub(crate) shares: &'w mut [Share],
     /// Constants of the basis and the kernels. Shape: `[B]`.
     pub(crate) blocks: &'w mut [BlockRest],
-    /// `D = T - I` of the pose, or scratch. Shape: `[V]`, solver order.
+    /// `D = T - I` of the pose, or scratch. Shape: `[V]`, lanes.
     pub(crate) gradients: &'w mut [Gradient],
     /// Whether another job has used the gradients since the last frame.
     pub(crate) gradients_are_stale: bool,
@@ -167,10 +167,9 @@ impl<'w> Workspace<'w> {
         let tier = basis.exact();
         let decoder = decoder(&tier, self.shares, self.blocks, true);
         let mut group = [[0.0; GROUP_NODES]; FEATURE_COUNT];
-        for (g, solvers) in tier.solver_from_lane().chunks(GROUP_NODES).enumerate() {
+        for (g, vertices) in basis.vertex_from_lane().chunks(GROUP_NODES).enumerate() {
             self.kernels.features(&decoder, g, &mut group);
-            for (n, &solver) in solvers.iter().enumerate() {
-                let v = basis.vertex_from_solver()[solver as usize];
+            for (n, &v) in vertices.iter().enumerate() {
                 features[v as usize] = group.map(|row| row[n]);
             }
         }

@@ -1,8 +1,9 @@
 //! The baked payload: everything the frame path reads, in the order it reads it. Written by the baker, opened by the
 //! runtime without allocating.
 //!
-//! Vertices carry two numbers: the source order (`vertex`) and the elimination order of the factor (`solver`). Decode,
-//! right-hand side and solve run in solver order; positions, normals and faces keep source order.
+//! Vertices carry three numbers: the source order (`vertex`) of positions, normals and faces; the order of decode and
+//! right-hand side (`lane`), in which what moves together stands together; and the elimination order of the factor
+//! (`solver`), in which the solve runs.
 
 use rkyv::{Archive, Serialize, with::InlineAsBox};
 
@@ -16,12 +17,12 @@ pub struct BakedBasis<'a> {
     /// Triangles in **source** order. Shape: `[F]`.
     #[rkyv(with = InlineAsBox)]
     pub faces: &'a [[u32; 3]],
-    /// Where a vertex stands in the exact tier. Shape: `[V]`, a permutation.
+    /// Lane of each vertex in the exact tier. Shape: `[V]`, a permutation.
     #[rkyv(with = InlineAsBox)]
-    pub solver_from_vertex: &'a [u32],
+    pub lane_from_vertex: &'a [u32],
     /// Shape: `[V]`, its inverse.
     #[rkyv(with = InlineAsBox)]
-    pub vertex_from_solver: &'a [u32],
+    pub vertex_from_lane: &'a [u32],
     /// Network value to log-rotation, radians. Positive.
     pub rotation_scale: f32,
     /// Network value to stretch. Positive.
@@ -46,17 +47,18 @@ pub struct BakedBasis<'a> {
     pub fast: Option<BakedTier<'a>>,
 }
 
-/// What a frame reads from blend to solve, for a set of N nodes: all vertices, or a graph that stands for them. Solver
-/// indices number the nodes in the tier's own order of elimination.
+/// What a frame reads from decode to solve, for a set of N nodes: all vertices, or a graph that stands for them. Lanes number
+/// the nodes in the order of decoding, [`GROUP_NODES`] lanes a group, the last group perhaps short; solver indices in
+/// the tier's own order of elimination.
 #[derive(Archive, Serialize, Debug, Clone, Copy)]
 pub struct BakedTier<'a> {
-    /// Rest shape of the nodes, solver order. Shape: `[N]`.
+    /// Rest shape of the nodes. Shape: `[N]`, lanes.
     #[rkyv(with = InlineAsBox)]
     pub rest_positions: &'a [[f32; 3]],
-    /// One-rings (with bridges) in solver order, compressed rows. Shape: `[N + 1]`, starts at 0, never falls.
+    /// One-rings (with bridges) of the lanes, compressed rows. Shape: `[N + 1]`, starts at 0, never falls.
     #[rkyv(with = InlineAsBox)]
     pub ring_offsets: &'a [u32],
-    /// Solver indices, ascending within a row, never the row itself. Shape: `[2 * edges]`.
+    /// Lanes, ascending within a row, never the row itself. Shape: `[2 * edges]`.
     #[rkyv(with = InlineAsBox)]
     pub ring: &'a [u32],
     /// Half the cotangent sum of each edge, non-negative, symmetric. Shape: that of `ring`.
@@ -74,8 +76,7 @@ pub struct BakedTier<'a> {
     /// `1 / D`, positive. Shape: `[N]`.
     #[rkyv(with = InlineAsBox)]
     pub inverse_pivots: &'a [f32],
-    /// Solver index of each lane: the order in which a frame decodes, [`GROUP_NODES`] lanes a group, the last group
-    /// perhaps short. Shape: `[N]`, a permutation.
+    /// Solver index of each lane. Shape: `[N]`, a permutation.
     #[rkyv(with = InlineAsBox)]
     pub solver_from_lane: &'a [u32],
     /// Shape: `[N]`, its inverse.

@@ -51,7 +51,7 @@ impl<'a> BakedView<'a> {
 
     /// V, at least 3.
     pub fn vertex_count(&self) -> usize {
-        self.archived.solver_from_vertex.len()
+        self.archived.lane_from_vertex.len()
     }
 
     /// B, at least 1.
@@ -70,13 +70,13 @@ impl<'a> BakedView<'a> {
     }
 
     /// Shape: `[V]`, a permutation.
-    pub fn solver_from_vertex(&self) -> &'a [u32] {
-        native(&self.archived.solver_from_vertex)
+    pub fn lane_from_vertex(&self) -> &'a [u32] {
+        native(&self.archived.lane_from_vertex)
     }
 
     /// Shape: `[V]`, its inverse.
-    pub fn vertex_from_solver(&self) -> &'a [u32] {
-        native(&self.archived.vertex_from_solver)
+    pub fn vertex_from_lane(&self) -> &'a [u32] {
+        native(&self.archived.vertex_from_lane)
     }
 
     /// Network value to log-rotation, radians, positive.
@@ -154,7 +154,7 @@ impl<'a> TierView<'a> {
         self.archived.rest_positions.len()
     }
 
-    /// Solver order, finite. Shape: `[N]`.
+    /// Lanes, finite. Shape: `[N]`.
     pub fn rest_positions(&self) -> &'a [[f32; 3]] {
         native(&self.archived.rest_positions)
     }
@@ -164,7 +164,7 @@ impl<'a> TierView<'a> {
         native(&self.archived.ring_offsets)
     }
 
-    /// Solver indices < N, ascending within a row, never the row itself.
+    /// Lanes < N, ascending within a row, never the row itself.
     pub fn ring(&self) -> &'a [u32] {
         native(&self.archived.ring)
     }
@@ -221,21 +221,19 @@ impl<'a> TierView<'a> {
 
     /// What the patches hold that is not zero, group by group.
     pub fn entries(&self) -> impl Iterator<Item = TierEntry> + use<'a> {
+        /// Without the sign: both zeros are zero.
+        const MAGNITUDE: u16 = 0x7fff;
         let tier = *self;
-        let lanes = tier.solver_from_lane();
-        let groups = tier.patch_offsets().windows(2).zip(lanes.chunks(GROUP_NODES));
-        groups.flat_map(move |(row, lanes)| {
-            (row[0] as usize..row[1] as usize).flat_map(move |t| {
-                lanes.iter().enumerate().filter_map(move |(n, &solver)| {
-                    /// Without the sign: both zeros are zero.
-                    const MAGNITUDE: u16 = 0x7fff;
-                    let values = tier.patch_values()[t].map(|row| row[n]);
-                    values.iter().any(|half| half & MAGNITUDE != 0).then_some(TierEntry {
-                        component: usize::from(tier.patch_owners()[t][0]),
-                        solver: solver as usize,
-                        values,
-                    })
-                })
+        let patches = tier.patch_offsets().windows(2).enumerate();
+        let patches = patches.flat_map(|(g, row)| (row[0] as usize..row[1] as usize).map(move |p| (g, p)));
+        let lanes = patches.flat_map(|(g, p)| (0..GROUP_NODES).map(move |n| (g * GROUP_NODES + n, p, n)));
+        lanes.filter_map(move |(lane, p, n)| {
+            let values = tier.patch_values()[p].map(|row| row[n]);
+            let moves = lane < tier.node_count() && values.iter().any(|half| half & MAGNITUDE != 0);
+            moves.then_some(TierEntry {
+                component: usize::from(tier.patch_owners()[p][0]),
+                lane,
+                values,
             })
         })
     }
@@ -246,8 +244,8 @@ impl<'a> TierView<'a> {
 pub struct TierEntry {
     /// k < K.
     pub component: usize,
-    /// Solver index < N.
-    pub solver: usize,
+    /// < N.
+    pub lane: usize,
     /// Half bits; times the component's `value_scale`.
     pub values: [u16; FEATURE_COUNT],
 }

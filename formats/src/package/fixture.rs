@@ -18,8 +18,8 @@ use super::{
 pub const VERTEX_COUNT: usize = 9;
 /// K: two coarse components, one fine component on each.
 pub const COMPONENT_COUNT: usize = 4;
-/// Elimination order: the middle of the grid last.
-pub const VERTEX_FROM_SOLVER: [u32; VERTEX_COUNT] = [0, 2, 6, 8, 1, 3, 5, 7, 4];
+/// Order of decoding: the elimination order backwards, which takes the middle of the grid last.
+pub const VERTEX_FROM_LANE: [u32; VERTEX_COUNT] = [4, 7, 5, 3, 1, 8, 6, 2, 0];
 /// The vertex that the solve holds.
 pub const ANCHOR_VERTEX: u32 = 0;
 
@@ -47,8 +47,8 @@ pub struct TinyCompact {
 pub struct TinyBaked {
     pub compact_id: [u8; 16],
     pub faces: Vec<[u32; 3]>,
-    pub solver_from_vertex: Vec<u32>,
-    pub vertex_from_solver: Vec<u32>,
+    pub lane_from_vertex: Vec<u32>,
+    pub vertex_from_lane: Vec<u32>,
     pub rotation_scale: f32,
     pub stretch_scale: f32,
     pub blocks: Vec<BakedBlock>,
@@ -104,8 +104,8 @@ impl TinyBaked {
         BakedBasis {
             compact_id: self.compact_id,
             faces: &self.faces,
-            solver_from_vertex: &self.solver_from_vertex,
-            vertex_from_solver: &self.vertex_from_solver,
+            lane_from_vertex: &self.lane_from_vertex,
+            vertex_from_lane: &self.vertex_from_lane,
             rotation_scale: self.rotation_scale,
             stretch_scale: self.stretch_scale,
             blocks: &self.blocks,
@@ -208,36 +208,33 @@ pub fn tiny_compact() -> TinyCompact {
 pub fn tiny_baked() -> TinyBaked {
     let compact = tiny_compact();
     let weights = edge_weights();
-    let solver_from_vertex: Vec<u32> = (0..VERTEX_COUNT as u32)
-        .map(|vertex| VERTEX_FROM_SOLVER.iter().position(|&v| v == vertex).unwrap_or_default() as u32)
+    let lane_from_vertex: Vec<u32> = (0..VERTEX_COUNT as u32)
+        .map(|vertex| VERTEX_FROM_LANE.iter().position(|&v| v == vertex).unwrap_or_default() as u32)
         .collect();
     let mut exact = TinyTier {
-        rest_positions: VERTEX_FROM_SOLVER.map(|v| compact.rest_positions[v as usize]).to_vec(),
+        rest_positions: VERTEX_FROM_LANE.map(|v| compact.rest_positions[v as usize]).to_vec(),
         ring_offsets: alloc::vec![0],
-        // Lanes against the order of elimination.
         solver_from_lane: (0..VERTEX_COUNT as u32).rev().collect(),
         lane_from_solver: (0..VERTEX_COUNT as u32).rev().collect(),
         ..TinyTier::default()
     };
     for row in 0..VERTEX_COUNT {
         for column in 0..VERTEX_COUNT {
-            if let Some(weight) = weights[VERTEX_FROM_SOLVER[row] as usize][VERTEX_FROM_SOLVER[column] as usize] {
+            if let Some(weight) = weights[VERTEX_FROM_LANE[row] as usize][VERTEX_FROM_LANE[column] as usize] {
                 exact.ring.push(column as u32);
                 exact.ring_weights.push(weight);
             }
         }
         exact.ring_offsets.push(exact.ring.len() as u32);
     }
-    factorize(&mut exact, solver_from_vertex[ANCHOR_VERTEX as usize] as usize);
+    factorize(&mut exact, lane_from_vertex[ANCHOR_VERTEX as usize] as usize);
     fold(&compact, &mut exact);
-    let lane_from_vertex = |&solver: &u32| exact.lane_from_solver[solver as usize];
-    let lanes: Vec<u32> = solver_from_vertex.iter().map(lane_from_vertex).collect();
-    let fans = Fans::gather(&compact.faces, &lanes);
+    let fans = Fans::gather(&compact.faces, &lane_from_vertex);
     TinyBaked {
         compact_id: compact_id(&compact),
         faces: compact.faces.clone(),
-        solver_from_vertex,
-        vertex_from_solver: VERTEX_FROM_SOLVER.to_vec(),
+        lane_from_vertex,
+        vertex_from_lane: VERTEX_FROM_LANE.to_vec(),
         rotation_scale: compact.rotation_scale,
         stretch_scale: compact.stretch_scale,
         blocks: compact.blocks.iter().map(baked_block).collect(),
@@ -269,17 +266,19 @@ fn baked_component(component: &ComponentRecord<'static>) -> BakedComponent<'stat
     }
 }
 
-/// The Laplacian, with 1 added at the anchor (solver index), to `F D F^T`, dense.
+/// The Laplacian, with 1 added at the anchor (a lane), to `F D F^T`, dense.
 fn factorize(tier: &mut TinyTier, anchor: usize) {
     let mut lower = [[0.0_f64; VERTEX_COUNT]; VERTEX_COUNT];
-    for row in 0..VERTEX_COUNT {
-        for entry in tier.ring_offsets[row] as usize..tier.ring_offsets[row + 1] as usize {
+    let solver = |lane: usize| tier.solver_from_lane[lane] as usize;
+    for lane in 0..VERTEX_COUNT {
+        let row = solver(lane);
+        for entry in tier.ring_offsets[lane] as usize..tier.ring_offsets[lane + 1] as usize {
             let weight = f64::from(tier.ring_weights[entry]);
             lower[row][row] += weight;
-            lower[row][tier.ring[entry] as usize] -= weight;
+            lower[row][solver(tier.ring[entry] as usize)] -= weight;
         }
     }
-    lower[anchor][anchor] += 1.0;
+    lower[solver(anchor)][solver(anchor)] += 1.0;
     tier.factor_offsets.push(0);
     for column in 0..VERTEX_COUNT {
         let pivot = lower[column][column];
@@ -304,10 +303,10 @@ fn fold(compact: &TinyCompact, tier: &mut TinyTier) {
     let mut entries = Vec::new();
     for (k, component) in compact.components.iter().enumerate() {
         let decoder = &compact.blocks[component.block as usize].decoder;
-        for (solver, values) in convolve(decoder, &dense[k], tier).into_iter().enumerate() {
+        for (lane, values) in convolve(decoder, &dense[k], tier).into_iter().enumerate() {
             if values != [0.0; FEATURE_COUNT] {
                 let halves = values.map(|value| f16::from_f32(value).to_bits());
-                entries.push((k, component.block, tier.lane_from_solver[solver], halves));
+                entries.push((k, component.block, lane as u32, halves));
             }
         }
     }
@@ -331,23 +330,22 @@ fn dense_components(compact: &TinyCompact) -> Vec<[[f32; FEATURE_COUNT]; VERTEX_
     dense.collect()
 }
 
-/// One component through a convolution without its bias; in source order, out solver order.
+/// One component through a convolution without its bias; in source order, out in lanes.
 fn convolve(
     conv: &GraphConvRecord,
     component: &[[f32; FEATURE_COUNT]; VERTEX_COUNT],
     tier: &TinyTier,
 ) -> Vec<[f32; FEATURE_COUNT]> {
-    let in_solver_order = |solver: u32| component[VERTEX_FROM_SOLVER[solver as usize] as usize];
+    let in_lanes = |lane: u32| component[VERTEX_FROM_LANE[lane as usize] as usize];
     let product = |matrix: &[[f32; FEATURE_COUNT]; FEATURE_COUNT], input: [f32; FEATURE_COUNT]| {
         matrix.map(|row| row.iter().zip(input).map(|(a, x)| a * x).sum::<f32>())
     };
-    let convolved = (0..VERTEX_COUNT).map(|solver| {
-        let ring = &tier.ring[tier.ring_offsets[solver] as usize..tier.ring_offsets[solver + 1] as usize];
-        let mean: [f32; FEATURE_COUNT] = core::array::from_fn(|i| {
-            ring.iter().map(|&other| in_solver_order(other)[i]).sum::<f32>() / ring.len() as f32
-        });
+    let convolved = (0..VERTEX_COUNT).map(|lane| {
+        let ring = &tier.ring[tier.ring_offsets[lane] as usize..tier.ring_offsets[lane + 1] as usize];
+        let mean: [f32; FEATURE_COUNT] =
+            core::array::from_fn(|i| ring.iter().map(|&other| in_lanes(other)[i]).sum::<f32>() / ring.len() as f32);
         let (point, neighbour) = (
-            product(&conv.point, in_solver_order(solver as u32)),
+            product(&conv.point, in_lanes(lane as u32)),
             product(&conv.neighbour, mean),
         );
         core::array::from_fn(|i| point[i] + neighbour[i])

@@ -66,8 +66,6 @@ pub(crate) struct Decoder<'a> {
     /// Shape: `[B]`.
     pub(crate) blocks: &'a [BlockRest],
     pub(crate) scales: FeatureScales,
-    /// Where the gradient of each lane goes. Shape: `[N]`; `G = ceil(N / GROUP_NODES)`.
-    pub(crate) places: &'a [u32],
     /// Also decodes what no changed component touches.
     pub(crate) all: bool,
 }
@@ -84,20 +82,20 @@ pub(crate) fn rest_activations<L: Lanes>(blocks: &mut [BlockRest]) {
     }
 }
 
-/// Gradients of the groups that a changed component touches; the others stay. Shape: `gradients` `[N]`, solver order.
+/// Gradients of the groups that a changed component touches; the others stay. Shape: `gradients` `[N]`.
 ///
 /// Features stay in registers: writing them costs more than computing them again where somebody asks.
 #[inline(always)]
 pub(crate) fn decode<L: Lanes>(decoder: &Decoder<'_>, gradients: &mut [Gradient]) {
-    for (g, places) in decoder.places.chunks(GROUP_NODES).enumerate() {
+    for (g, gradients) in gradients.chunks_mut(GROUP_NODES).enumerate() {
         let patches = decoder.patches.of(g);
         let changed = |owner: &[u16; 2]| decoder.shares[owner[0] as usize].changed != 0;
         if !decoder.all && !decoder.patches.owners[patches.clone()].iter().any(changed) {
             continue;
         }
-        for lane in (0..places.len()).step_by(L::COUNT) {
+        for lane in (0..gradients.len()).step_by(L::COUNT) {
             let x = blend::<L>(decoder, patches.clone(), lane);
-            scatter(&gradient(decoder.scales, &x), part::<L>(places, lane), gradients);
+            store(&gradient(decoder.scales, &x), &mut gradients[lane..]);
         }
     }
 }
@@ -113,17 +111,12 @@ pub(crate) fn features<L: Lanes>(decoder: &Decoder<'_>, g: usize, features: &mut
     }
 }
 
-/// Gradients of one group of features, to `places`.
+/// Gradients of one group of features, or of its first nodes. Shape: `gradients` at most `[GROUP_NODES]`.
 #[inline(always)]
-pub(crate) fn gradients<L: Lanes>(
-    scales: FeatureScales,
-    features: &Group<f32>,
-    places: &[u32],
-    gradients: &mut [Gradient],
-) {
-    for lane in (0..places.len()).step_by(L::COUNT) {
+pub(crate) fn gradients<L: Lanes>(scales: FeatureScales, features: &Group<f32>, gradients: &mut [Gradient]) {
+    for lane in (0..gradients.len()).step_by(L::COUNT) {
         let x = features.each_ref().map(|row| L::load(&row[lane..]));
-        scatter(&gradient(scales, &x), part::<L>(places, lane), gradients);
+        store(&gradient(scales, &x), &mut gradients[lane..]);
     }
 }
 
@@ -132,19 +125,17 @@ pub(crate) fn gradients<L: Lanes>(
 /// `dx = (1 - tanh^2(bias + u)) C_k` where the component reaches, `dT = [J_l(r) dr]x R S + R dS`.
 #[inline(always)]
 pub(crate) fn tangents<L: Lanes>(decoder: &Decoder<'_>, k: usize, scale: f32, gradients: &mut [Gradient]) {
-    for (g, places) in decoder.places.chunks(GROUP_NODES).enumerate() {
+    for (g, gradients) in gradients.chunks_mut(GROUP_NODES).enumerate() {
         let patches = decoder.patches.of(g);
         let owners = &decoder.patches.owners[patches.clone()];
         let Some(own) = owners.iter().position(|owner| owner[0] as usize == k) else {
-            for &place in places {
-                gradients[place as usize] = [[0.0; 4]; 3];
-            }
+            gradients.fill([[0.0; 4]; 3]);
             continue;
         };
         let b = owners[own][1];
         let block = owners.iter().position(|owner| owner[1] == b).unwrap_or(own);
         let values = &decoder.patches.values[patches.start + own];
-        for lane in (0..places.len()).step_by(L::COUNT) {
+        for lane in (0..gradients.len()).step_by(L::COUNT) {
             let (u, _) = block_blend::<L>(decoder, patches.start + block..patches.end, lane);
             let dx: Row<L> = core::array::from_fn(|c| {
                 let y = tanh(u[c]);
@@ -152,19 +143,9 @@ pub(crate) fn tangents<L: Lanes>(decoder: &Decoder<'_>, k: usize, scale: f32, gr
                 slope.mul(L::load_halves(&values[c][lane..]))
             });
             let x = blend::<L>(decoder, patches.clone(), lane);
-            scatter(
-                &gradient_tangent(decoder.scales, &x, &dx),
-                part::<L>(places, lane),
-                gradients,
-            );
+            store(&gradient_tangent(decoder.scales, &x, &dx), &mut gradients[lane..]);
         }
     }
-}
-
-/// The places of the lanes from `lane` on.
-#[inline(always)]
-fn part<L: Lanes>(places: &[u32], lane: usize) -> &[u32] {
-    &places[lane..places.len().min(lane + L::COUNT)]
 }
 
 impl Patches<'_> {
@@ -340,11 +321,14 @@ fn dot<L: Lanes>(a: &[L; 3], b: &[L; 3]) -> L {
     a[2].mul_add(b[2], a[1].mul_add(b[1], a[0].mul(b[0])))
 }
 
-/// Gradients to their places, by columns.
+/// Gradients by columns, for as many lanes as there are.
 #[inline(always)]
-fn scatter<L: Lanes>(d: &Row<L>, places: &[u32], gradients: &mut [Gradient]) {
+fn store<L: Lanes>(d: &Row<L>, gradients: &mut [Gradient]) {
     for column in 0..3 {
-        let rows = [d[column], d[3 + column], d[6 + column], L::splat(0.0)];
-        L::scatter(rows, places, column, gradients);
+        L::store_column(
+            [d[column], d[3 + column], d[6 + column], L::splat(0.0)],
+            column,
+            gradients,
+        );
     }
 }

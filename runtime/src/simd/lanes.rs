@@ -6,15 +6,13 @@
 use half::f16;
 use libm::sqrtf;
 
-use sinew_formats::package::GROUP_NODES;
-
 /// A deformation gradient less identity, `D = T - I`, as the right-hand side reads it: three columns, each filled up with
 /// a zero.
 pub(crate) type Gradient = [[f32; 4]; 3];
 
 /// A vector of f32. All operations are by lane and round as IEEE 754 says.
 pub(crate) trait Lanes: Copy {
-    /// Lanes; divides [`GROUP_NODES`].
+    /// Lanes; divides [`sinew_formats::package::GROUP_NODES`].
     const COUNT: usize;
 
     fn splat(value: f32) -> Self;
@@ -45,16 +43,8 @@ pub(crate) trait Lanes: Copy {
     fn select_below(self, limit: Self, yes: Self, no: Self) -> Self;
     /// Whether every lane is at most `limit`; not where one is NaN.
     fn all_at_most(self, limit: f32) -> bool;
-    /// Lane n of the rows to column `column` of `target[places[n]]`, for the places there are, at most all lanes.
-    fn scatter(rows: [Self; 4], places: &[u32], column: usize, target: &mut [Gradient]) {
-        let mut lanes = [[0.0; GROUP_NODES]; 4];
-        for (row, lanes) in rows.into_iter().zip(&mut lanes) {
-            row.store(lanes);
-        }
-        for (n, &place) in places.iter().enumerate() {
-            target[place as usize][column] = lanes.map(|row| row[n]);
-        }
-    }
+    /// Lane n of the rows to column `column` of `target[n]`, as far as both go.
+    fn store_column(rows: [Self; 4], column: usize, target: &mut [Gradient]);
 }
 
 /// The reference: one lane, no fused operation.
@@ -108,5 +98,8 @@ impl Lanes for One {
     }
     fn all_at_most(self, limit: f32) -> bool {
         self.0 <= limit
+    }
+    fn store_column(rows: [Self; 4], column: usize, target: &mut [Gradient]) {
+        target[0][column] = rows.map(|row| row.0);
     }
 }

@@ -47,7 +47,7 @@ impl Kernels {
     dispatch!(rest_activations(blocks: &mut [BlockRest]));
     dispatch!(decode(decoder: &Decoder<'_>, gradients: &mut [Gradient]));
     dispatch!(features(decoder: &Decoder<'_>, g: usize, features: &mut Group<f32>));
-    dispatch!(gradients(scales: FeatureScales, features: &Group<f32>, places: &[u32], gradients: &mut [Gradient]));
+    dispatch!(gradients(scales: FeatureScales, features: &Group<f32>, gradients: &mut [Gradient]));
     dispatch!(tangents(decoder: &Decoder<'_>, k: usize, scale: f32, gradients: &mut [Gradient]));
 }
 

@@ -28,7 +28,8 @@ fn factor_reproduces_the_laplacian() {
     let largest = diagonal.iter().fold(0.0_f64, |largest, &d| largest.max(d));
     for i in 0..vertex_count {
         for j in 0..vertex_count {
-            let (v, w) = (baked.vertex_from_solver()[i] as usize, baked.vertex_from_solver()[j]);
+            let [v, w] = [i, j].map(|s| baked.vertex_from_lane()[baked.exact().lane_from_solver()[s] as usize]);
+            let v = v as usize;
             let expected = match surface.topology.entry(v, w) {
                 Some(entry) => -surface.weights.weights[entry],
                 None if v == w as usize => diagonal[v],
@@ -53,14 +54,14 @@ fn identity_convolution_changes_no_value() {
     let baked = BakedView::open(&baked).unwrap();
     let components = sparse::unpack_components(&compact);
     for (k, (component, stored)) in baked.components().zip(&components).enumerate() {
-        let support = baked.exact().support_of(component.block as usize);
-        let (slots, values) = baked.exact().entries_of(k);
-        assert_eq!(slots.len(), stored.vertices.len(), "component {k} keeps its support");
-        for (&slot, bits) in slots.iter().zip(values) {
-            let vertex = baked.vertex_from_solver()[support[slot as usize] as usize];
+        let own: Vec<_> = baked.exact().entries().filter(|entry| entry.component == k).collect();
+        assert_eq!(own.len(), stored.vertices.len(), "component {k} keeps its support");
+        for entry in own {
+            let vertex = baked.vertex_from_lane()[entry.lane];
             let place = stored.vertices.binary_search(&vertex).unwrap();
-            let value: [f32; FEATURE_COUNT] =
-                bits.map(|bits| half::f16::from_bits(bits).to_f32() * component.value_scale);
+            let value: [f32; FEATURE_COUNT] = entry
+                .values
+                .map(|bits| half::f16::from_bits(bits).to_f32() * component.value_scale);
             assert_eq!(value, stored.values[place], "component {k}, vertex {vertex}");
         }
     }

@@ -12,8 +12,8 @@ pub(in super::super) fn check(view: &BakedView<'_>) -> Result<(), OpenError> {
     let vertex_count = positions(view.exact().rest_positions(), 3)?;
     faces(view.faces(), vertex_count)?;
     permutation(
-        ["solver_from_vertex", "vertex_from_solver"],
-        [view.solver_from_vertex(), view.vertex_from_solver()],
+        ["lane_from_vertex", "vertex_from_lane"],
+        [view.lane_from_vertex(), view.vertex_from_lane()],
         vertex_count,
     )?;
     fans(view, vertex_count)?;

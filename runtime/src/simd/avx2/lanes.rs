@@ -81,7 +81,7 @@ impl Lanes for Eight {
         unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, _mm256_set1_ps(limit))) == 0xff }
     }
     #[inline(always)]
-    fn scatter(rows: [Self; 4], places: &[u32], column: usize, target: &mut [Gradient]) {
+    fn store_column(rows: [Self; 4], column: usize, target: &mut [Gradient]) {
         let [a, b, c, d] = rows.map(|row| row.0);
         // Two 4x4 transposes at once: lane 4 n + i is half n of quad i.
         let quads = unsafe {
@@ -95,9 +95,8 @@ impl Lanes for Eight {
             ]
         };
         let mut store = |lane: usize, half: __m128| {
-            if let Some(&place) = places.get(lane) {
-                let column = &mut target[place as usize][column];
-                unsafe { _mm_storeu_ps(column.as_mut_ptr(), half) }
+            if let Some(gradient) = target.get_mut(lane) {
+                unsafe { _mm_storeu_ps(gradient[column].as_mut_ptr(), half) }
             }
         };
         for (i, quad) in quads.into_iter().enumerate() {

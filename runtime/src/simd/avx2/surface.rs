@@ -20,10 +20,10 @@ pub(crate) fn normals(around: &Around<'_>, posed: &[[f32; 4]], normals: &mut [[f
 
 #[target_feature(enable = "avx2,fma,f16c")]
 fn compiled(around: &Around<'_>, posed: &[[f32; 4]], normals: &mut [[f32; 3]]) {
-    let (groups, _) = around.solver_from_lane.as_chunks::<{ Eight::COUNT }>();
+    let (groups, _) = around.vertex_from_lane.as_chunks::<{ Eight::COUNT }>();
     let rows = around.offsets.windows(2).map(|row| row[0] as usize..row[1] as usize);
     let mut quads = posed.as_chunks::<FAN_VERTICES>().0.iter().zip(rows);
-    for solvers in groups {
+    for vertices in groups {
         let mut sums = [[_mm256_setzero_ps(); 2]; 2];
         for (sum, (centre, row)) in sums.iter_mut().zip(&mut quads) {
             *sum = area(posed, centre, &around.fans[row]);
@@ -38,9 +38,9 @@ fn compiled(around: &Around<'_>, posed: &[[f32; 4]], normals: &mut [[f32; 3]]) {
         for (row, unit) in surface::unit([x, y, z].map(Eight)).into_iter().zip(&mut unit) {
             row.store(unit);
         }
-        for (lane, &solver) in solvers.iter().enumerate() {
+        for (lane, &v) in vertices.iter().enumerate() {
             let n = lane % 2 * 4 + lane / 2;
-            normals[around.vertex_from_solver[solver as usize] as usize] = unit.map(|row| row[n]);
+            normals[v as usize] = unit.map(|row| row[n]);
         }
     }
     surface::normals_from(groups.len() * Eight::COUNT, around, posed, normals);

@@ -90,7 +90,7 @@ impl Lanes for Sixteen {
         }
     }
     #[inline(always)]
-    fn scatter(rows: [Self; 4], places: &[u32], column: usize, target: &mut [Gradient]) {
+    fn store_column(rows: [Self; 4], column: usize, target: &mut [Gradient]) {
         let [a, b, c, d] = rows.map(|row| row.0);
         // Four 4x4 transposes at once: lane 4 n + i is quarter n of quad i.
         let quads = unsafe {
@@ -104,9 +104,8 @@ impl Lanes for Sixteen {
             ]
         };
         let mut store = |lane: usize, quarter: __m128| {
-            if let Some(&place) = places.get(lane) {
-                let column = &mut target[place as usize][column];
-                unsafe { _mm_storeu_ps(column.as_mut_ptr(), quarter) }
+            if let Some(gradient) = target.get_mut(lane) {
+                unsafe { _mm_storeu_ps(gradient[column].as_mut_ptr(), quarter) }
             }
         };
         for (i, quad) in quads.into_iter().enumerate() {

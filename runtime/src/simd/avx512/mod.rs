@@ -32,5 +32,5 @@ macro_rules! kernel {
 kernel!(rest_activations(blocks: &mut [BlockRest]));
 kernel!(decode(decoder: &Decoder<'_>, gradients: &mut [Gradient]));
 kernel!(features(decoder: &Decoder<'_>, g: usize, features: &mut Group<f32>));
-kernel!(gradients(scales: FeatureScales, features: &Group<f32>, places: &[u32], gradients: &mut [Gradient]));
+kernel!(gradients(scales: FeatureScales, features: &Group<f32>, gradients: &mut [Gradient]));
 kernel!(tangents(decoder: &Decoder<'_>, k: usize, scale: f32, gradients: &mut [Gradient]));

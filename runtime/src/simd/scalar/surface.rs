@@ -32,44 +32,43 @@ impl Bounds {
     }
 }
 
-/// Where the solver's nodes go. Shape: `[V]` each, permutations.
+/// The orders of the exact tier. Shape: `[V]` each, permutations.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Places<'a> {
-    pub(crate) vertex_from_solver: &'a [u32],
-    pub(crate) lane_from_solver: &'a [u32],
+pub(crate) struct Orders<'a> {
+    pub(crate) solver_from_lane: &'a [u32],
+    pub(crate) vertex_from_lane: &'a [u32],
 }
 
-/// `rest + displacement`, to `positions` in source order and to `posed` in lanes, filled up with a zero. Shape: all `[V]`.
+/// `rest + displacement`, to `posed`, filled up with a zero, and to `positions`. Shape: all `[V]`; `rest` and `posed` in lanes,
+/// `displacement` in solver order, `positions` in source order.
 ///
-/// Errors: the first vertex, in solver order, whose position is not finite; then the output is only partly written.
+/// Errors: the first vertex, in lanes, whose position is not finite; then the output is only partly written.
 pub(crate) fn scatter(
     rest: &[[f32; 3]],
     displacement: &[[f32; 3]],
-    places: Places<'_>,
+    orders: Orders<'_>,
     posed: &mut [[f32; 4]],
     positions: &mut [[f32; 3]],
 ) -> Result<Bounds, u32> {
     let mut bounds = Bounds::EMPTY;
     // Stays zero while all are finite.
     let mut trace = [0.0_f32; 3];
-    let nodes = rest.iter().zip(displacement);
-    let targets = places.vertex_from_solver.iter().zip(places.lane_from_solver);
-    for ((r, d), (&v, &lane)) in nodes.clone().zip(targets) {
+    let lanes = orders.solver_from_lane.iter().zip(orders.vertex_from_lane);
+    for ((r, posed), (&solver, &v)) in rest.iter().zip(posed.iter_mut()).zip(lanes) {
+        let d = displacement[solver as usize];
         let p = [r[0] + d[0], r[1] + d[1], r[2] + d[2]];
         for c in 0..3 {
             trace[c] += 0.0 * p[c];
         }
         bounds.include(&p);
         positions[v as usize] = p;
-        posed[lane as usize] = [p[0], p[1], p[2], 0.0];
+        *posed = [p[0], p[1], p[2], 0.0];
     }
     if trace == [0.0; 3] {
         return Ok(bounds);
     }
-    let lost = nodes
-        .zip(places.vertex_from_solver)
-        .find(|((r, d), _)| (0..3).any(|c| !(r[c] + d[c]).is_finite()));
-    Err(lost.map_or(0, |(_, &v)| v))
+    let lost = posed.iter().position(|p| !p.iter().all(|x| x.is_finite()));
+    Err(lost.map_or(0, |lane| orders.vertex_from_lane[lane]))
 }
 
 /// How the triangles lie around the vertices, see [`sinew_formats::package::BakedBasis`].
@@ -80,9 +79,7 @@ pub(crate) struct Around<'a> {
     /// Lanes.
     pub(crate) fans: &'a [[u32; FAN_VERTICES]],
     /// Shape: `[V]`.
-    pub(crate) solver_from_lane: &'a [u32],
-    /// Shape: `[V]`.
-    pub(crate) vertex_from_solver: &'a [u32],
+    pub(crate) vertex_from_lane: &'a [u32],
 }
 
 /// Unit vertex normals, the sum of the triangles' normals times their area. Shape: `posed` `[V]` in lanes, `normals` `[V]` in
@@ -95,10 +92,9 @@ pub(crate) fn normals(around: &Around<'_>, posed: &[[f32; 4]], normals: &mut [[f
 
 /// Those of the lanes from `first` on.
 pub(crate) fn normals_from(first: usize, around: &Around<'_>, posed: &[[f32; 4]], normals: &mut [[f32; 3]]) {
-    for (lane, &solver) in around.solver_from_lane.iter().enumerate().skip(first) {
+    for (lane, &v) in around.vertex_from_lane.iter().enumerate().skip(first) {
         let (quad, column) = (lane / FAN_VERTICES, lane % FAN_VERTICES);
         let fan = &around.fans[around.offsets[quad] as usize..around.offsets[quad + 1] as usize];
-        let v = around.vertex_from_solver[solver as usize];
         let sum = area(posed, lane, fan.iter().map(|step| step[column]));
         normals[v as usize] = unit(sum.map(One)).map(|One(x)| x);
     }
@@ -167,8 +163,7 @@ mod tests {
         let around = Around {
             offsets: &fan_offsets,
             fans: &fans,
-            solver_from_lane: &lanes,
-            vertex_from_solver: &lanes,
+            vertex_from_lane: &lanes,
         };
         let posed: Vec<[f32; 4]> = positions.iter().map(|p| [p[0], p[1], p[2], 0.0]).collect();
         let mut found = vec![[f32::NAN; 3]; positions.len()];
@@ -180,12 +175,12 @@ mod tests {
         let count = displacement.len();
         let rest: Vec<[f32; 3]> = (0..count).map(|s| [s as f32 + 1.0, 0.0, 0.0]).collect();
         let lanes: Vec<u32> = (0..count as u32).rev().collect();
-        let places = Places {
-            vertex_from_solver: order,
-            lane_from_solver: &lanes,
+        let orders = Orders {
+            solver_from_lane: &lanes,
+            vertex_from_lane: order,
         };
         let (mut positions, mut posed) = (vec![[0.0; 3]; count], vec![[9.0; 4]; count]);
-        let outcome = scatter(&rest, displacement, places, &mut posed, &mut positions);
+        let outcome = scatter(&rest, displacement, orders, &mut posed, &mut positions);
         (outcome, positions, posed)
     }
 
