@@ -12,10 +12,10 @@ use super::lanes::Lanes;
 
 /// Arguments beyond have the value at this one, which differs from 1 by less than [`TANH_TOLERANCE`].
 const TANH_END: f32 = 8.0;
-/// `tanh x = x P(x^2) / Q(x^2)` to 1.5e-7 of its value up to [`TANH_END`], before rounding.
-const TANH_P: [f32; 4] = [0.999_999_85, 0.129_256_36, 0.002_950_994_4, 1.142_810_9e-5];
+/// `tanh x = x P(x^2) / Q(x^2)` to 7e-9 of its value up to [`TANH_END`], before rounding.
+const TANH_P: [f32; 5] = [1.0, 0.134_444_56, 0.003_571_547, 2.189_378e-5, 1.522_907_4e-8];
 /// See [`TANH_P`]; Q(0) = 1.
-const TANH_Q: [f32; 5] = [1.0, 0.462_588_52, 0.023_815_435, 2.386_649_3e-4, 2.459_101_3e-7];
+const TANH_Q: [f32; 5] = [1.0, 0.467_777_82, 0.026_164_252, 3.411_207e-4, 8.521_924_5e-7];
 
 /// Greatest absolute error of [`tanh`].
 #[cfg(test)]

@@ -3,9 +3,6 @@
 #![allow(unsafe_code)]
 
 mod lanes;
-mod surface;
-
-pub(crate) use surface::normals;
 
 use super::decode::{BlockRest, Decoder, FeatureScales, Group};
 use super::lanes::Gradient;

@@ -186,14 +186,13 @@ mod tests {
 
     #[test]
     fn scatter_follows_both_permutations_and_bounds_the_positions() {
-        let (bounds, positions, posed) = scattered(&[[0.0, 0.5, 0.0]; 3], &[2, 0, 1]);
-        assert_eq!(positions, [[2.0, 0.5, 0.0], [3.0, 0.5, 0.0], [1.0, 0.5, 0.0]]);
-        assert_eq!(
-            posed,
-            [[3.0, 0.5, 0.0, 0.0], [2.0, 0.5, 0.0, 0.0], [1.0, 0.5, 0.0, 0.0]]
-        );
+        let displacement = [[0.0, 0.5, 0.0], [0.0, 0.25, 0.0], [0.0, 0.125, 0.0]];
+        let (bounds, positions, posed) = scattered(&displacement, &[2, 0, 1]);
+        assert_eq!(positions, [[2.0, 0.25, 0.0], [3.0, 0.5, 0.0], [1.0, 0.125, 0.0]]);
+        let filled = |[x, y, z]: [f32; 3]| [x, y, z, 0.0];
+        assert_eq!(posed, [positions[2], positions[0], positions[1]].map(filled));
         let expected = Bounds {
-            minimum: [1.0, 0.5, 0.0],
+            minimum: [1.0, 0.125, 0.0],
             maximum: [3.0, 0.5, 0.0],
         };
         assert_eq!(bounds, Ok(expected));
@@ -205,7 +204,7 @@ mod tests {
             for c in 0..3 {
                 let mut displacement = [[0.0; 3]; 4];
                 displacement[1][c] = bad;
-                assert_eq!(scattered(&displacement, &[1, 0, 3, 2]).0, Err(0));
+                assert_eq!(scattered(&displacement, &[1, 0, 3, 2]).0, Err(3));
             }
         }
     }
