@@ -21,7 +21,8 @@ const TANH_Q: [f32; 5] = [1.0, 0.467_777_82, 0.026_164_252, 3.411_207e-4, 8.521_
 #[cfg(test)]
 pub(crate) const TANH_TOLERANCE: f64 = 4e-7;
 
-/// Hyperbolic tangent: odd, between -1 and 1, zero at zero, never not a number for a number or an infinity.
+/// Hyperbolic tangent: odd, between -1 and 1, zero at zero, never not a number for a number or an infinity. It rises, but
+/// for roundings.
 #[inline(always)]
 pub(crate) fn tanh<L: Lanes>(x: L) -> L {
     let x = x.min(L::splat(TANH_END)).max(L::splat(-TANH_END));
