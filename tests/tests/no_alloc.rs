@@ -52,7 +52,7 @@ fn requests(work: impl FnOnce()) -> u64 {
 fn packages() -> [sinew_formats::package::AlignedBytes; 2] {
     let baked = tiny_baked();
     let mut other = tiny_baked();
-    other.rest_positions[0][2] += 0.25;
+    other.exact.rest_positions[0][2] += 0.25;
     [baked, other].map(|baked| write_baked(&baked.basis()).expect("the fixture is valid"))
 }
 
