@@ -7,18 +7,22 @@ use std::vec;
 use std::vec::Vec;
 
 use half::f16;
-use sinew_formats::package::{AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedTier, NONE, write_baked};
+use sinew_formats::package::{
+    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedTier, Fans, NONE, Patches, write_baked,
+};
 
 use crate::basis::Basis;
 use crate::simd::scalar::naive::Noise;
 use crate::simd::scalar::poisson::{BLOCK, Factor, Rings};
 use crate::workspace::{Workspace, WorkspaceLayout};
 
-/// A bumpy grid of triangles in a scrambled solver order, every edge of another weight.
+/// A bumpy grid of triangles in scrambled lanes and another order of elimination, every edge of another weight.
 pub(crate) struct Grid {
     pub(crate) rest: Vec<[f32; 3]>,
     pub(crate) faces: Vec<[u32; 3]>,
-    pub(crate) solver_from_vertex: Vec<u32>,
+    pub(crate) lane_from_vertex: Vec<u32>,
+    pub(crate) solver_from_lane: Vec<u32>,
+    /// A lane.
     pub(crate) anchor: usize,
     offsets: Vec<u32>,
     ring: Vec<u32>,
@@ -29,7 +33,7 @@ impl Grid {
     pub(crate) fn new(width: u32, height: u32) -> Self {
         let count = width * height;
         let stride = (2..).find(|n| gcd(*n, count) == 1).unwrap();
-        let solver_from_vertex: Vec<u32> = (0..count).map(|v| (v * stride + 1) % count).collect();
+        let lane_from_vertex: Vec<u32> = (0..count).map(|v| (v * stride + 1) % count).collect();
         let mut noise = Noise::new(100);
         let mut rest = vec![[0.0; 3]; count as usize];
         let mut faces = Vec::new();
@@ -37,7 +41,7 @@ impl Grid {
         for y in 0..height {
             for x in 0..width {
                 let v = y * width + x;
-                rest[solver_from_vertex[v as usize] as usize] = [x as f32, y as f32, 0.3 * noise.next()];
+                rest[lane_from_vertex[v as usize] as usize] = [x as f32, y as f32, 0.3 * noise.next()];
                 if x + 1 < width && y + 1 < height {
                     faces.push([v, v + 1, v + width]);
                     faces.push([v + 1, v + width + 1, v + width]);
@@ -46,10 +50,7 @@ impl Grid {
         }
         for face in &faces {
             for (a, b) in [(0, 1), (1, 2), (2, 0)] {
-                let (i, j) = (
-                    solver_from_vertex[face[a] as usize],
-                    solver_from_vertex[face[b] as usize],
-                );
+                let (i, j) = (lane_from_vertex[face[a] as usize], lane_from_vertex[face[b] as usize]);
                 let weight = 1.0 + 0.5 * noise.next();
                 rows[i as usize].insert(j, weight);
                 rows[j as usize].insert(i, weight);
@@ -65,7 +66,9 @@ impl Grid {
         Self {
             rest,
             faces,
-            solver_from_vertex,
+            lane_from_vertex,
+            // Seven divides no count of a test.
+            solver_from_lane: (0..count).map(|lane| (13 * lane + 3) % count).collect(),
             anchor: count as usize / 2,
             offsets,
             ring,
@@ -82,6 +85,7 @@ impl Grid {
             offsets: &self.offsets,
             neighbours: &self.ring,
             weights: &self.weights,
+            solver_from_lane: &self.solver_from_lane,
         }
     }
 
@@ -93,14 +97,25 @@ impl Grid {
         })
     }
 
-    /// Dense Laplacian with the anchor's penalty.
+    /// Rows in lanes to rows in solver order.
+    pub(crate) fn in_solver_order<T: Copy>(&self, lanes: &[T]) -> Vec<T> {
+        let mut rows = lanes.to_vec();
+        for (&solver, row) in self.solver_from_lane.iter().zip(lanes) {
+            rows[solver as usize] = *row;
+        }
+        rows
+    }
+
+    /// Dense Laplacian with the anchor's penalty, solver order.
     pub(crate) fn laplacian(&self) -> Vec<Vec<f64>> {
         let mut matrix = vec![vec![0.0; self.vertex_count()]; self.vertex_count()];
         for (i, j, weight) in self.edges_both_ways() {
+            let [i, j] = [i, j].map(|lane| self.solver_from_lane[lane] as usize);
             matrix[i][j] -= f64::from(weight);
             matrix[i][i] += f64::from(weight);
         }
-        matrix[self.anchor][self.anchor] += 6.0;
+        let anchor = self.solver_from_lane[self.anchor] as usize;
+        matrix[anchor][anchor] += 6.0;
         matrix
     }
 }
@@ -231,18 +246,18 @@ impl Package {
     fn on(grid: &Grid, seed: u64, compact_id: [u8; 16], name: impl Fn(usize) -> String) -> Self {
         let mut noise = Noise::new(seed);
         let count = grid.vertex_count() as u32;
-        let mut vertex_from_solver = vec![0; count as usize];
-        for (v, &s) in grid.solver_from_vertex.iter().enumerate() {
-            vertex_from_solver[s as usize] = v as u32;
+        let mut vertex_from_lane = vec![0; count as usize];
+        for (v, &s) in grid.lane_from_vertex.iter().enumerate() {
+            vertex_from_lane[s as usize] = v as u32;
         }
         let supports: [Vec<u32>; 3] = [
             (0..count).collect(),
-            (0..count).filter(|s| s % 3 != 1).collect(),
-            (0..count).filter(|s| s % 2 == 0).collect(),
+            (0..count).filter(|lane| lane % 3 != 1).collect(),
+            (0..count).filter(|lane| lane % 2 == 0).collect(),
         ];
         let (mut blocks, mut components) = (Vec::new(), Vec::new());
-        let (mut support_offsets, mut entry_offsets) = (vec![0], vec![0]);
-        let (mut support, mut slots, mut values) = (Vec::new(), Vec::new(), Vec::new());
+        let lane_from_solver = grid.in_solver_order(&(0..count).collect::<Vec<u32>>());
+        let mut entries = Vec::new();
         let names: Vec<String> = (0..Self::COMPONENTS).map(name).collect();
         for (b, (parent, component_count)) in [(NONE, 2), (0, 1), (1, 2)].into_iter().enumerate() {
             blocks.push(BakedBlock {
@@ -256,11 +271,10 @@ impl Package {
                 let k = components.len();
                 for slot in 0..supports[b].len() as u32 {
                     if !(slot as usize + k).is_multiple_of(5) {
-                        slots.push(slot);
-                        values.push(noise.features().map(|x| f16::from_f32(0.125 * x).to_bits()));
+                        let values = noise.features().map(|x| f16::from_f32(0.125 * x).to_bits());
+                        entries.push((k, b as u32, supports[b][slot as usize], values));
                     }
                 }
-                entry_offsets.push(slots.len() as u32);
                 components.push(BakedComponent {
                     name: &names[k],
                     block: b as u32,
@@ -269,19 +283,21 @@ impl Package {
                     value_scale: 4.0,
                 });
             }
-            support.extend(&supports[b]);
-            support_offsets.push(support.len() as u32);
         }
+        let patches = Patches::gather(grid.vertex_count(), entries);
+        let fans = Fans::gather(&grid.faces, &grid.lane_from_vertex);
         let factor = factorise(&grid.laplacian());
         let bytes = write_baked(&BakedBasis {
             compact_id,
             faces: &grid.faces,
-            solver_from_vertex: &grid.solver_from_vertex,
-            vertex_from_solver: &vertex_from_solver,
+            lane_from_vertex: &grid.lane_from_vertex,
+            vertex_from_lane: &vertex_from_lane,
             rotation_scale: 1.5,
             stretch_scale: 0.4,
             blocks: &blocks,
             components: &components,
+            fan_offsets: &fans.fan_offsets,
+            fans: &fans.fans,
             exact: BakedTier {
                 rest_positions: &grid.rest,
                 ring_offsets: &grid.offsets,
@@ -291,16 +307,16 @@ impl Package {
                 tile_rows: &factor.rows,
                 tiles: &factor.tiles,
                 inverse_diagonals: &factor.inverse_diagonals,
-                support_offsets: &support_offsets,
-                support: &support,
-                entry_offsets: &entry_offsets,
-                entry_slots: &slots,
-                entry_values: &values,
+                solver_from_lane: &grid.solver_from_lane,
+                lane_from_solver: &lane_from_solver,
+                patch_offsets: &patches.patch_offsets,
+                patch_owners: &patches.patch_owners,
+                patch_values: &patches.patch_values,
             },
             fast: None,
         })
         .unwrap();
-        let rest_in_source_order = grid.solver_from_vertex.iter().map(|&s| grid.rest[s as usize]).collect();
+        let rest_in_source_order = grid.lane_from_vertex.iter().map(|&s| grid.rest[s as usize]).collect();
         Self {
             bytes,
             rest_in_source_order,

@@ -6,16 +6,19 @@
 
 pub mod factor;
 pub mod fold;
+pub mod groups;
 pub mod mesh;
 pub mod sparse;
 mod surface;
 
 use sinew_formats::package::{
-    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedTier, CompactView, OpenError, WriteError, write_baked,
+    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedTier, CompactView, Fans, OpenError, WriteError,
+    write_baked,
 };
 
 use factor::{AnchoredLaplacian, EliminationOrder, Factor};
-use fold::{FoldFrame, FoldedBlocks, FoldedComponent};
+use fold::{FoldFrame, FoldedComponent};
+use groups::LaneOrder;
 pub use surface::Surface;
 
 /// Why a package cannot be baked.
@@ -56,16 +59,21 @@ pub fn bake(package: &CompactView<'_>) -> Result<AlignedBytes, BakeError> {
     let laplacian = surface.laplacian(package.anchor_vertex() as usize);
     let order = EliminationOrder::new(&laplacian)?;
     let factor = Factor::new(&laplacian, &order)?;
-    let rings = SolverRings::new(&laplacian, &order);
-    let rest_positions: Vec<[f32; 3]> = order
-        .vertex_from_solver
-        .iter()
-        .map(|&v| package.rest_positions()[v as usize])
-        .collect();
-
     let folded = fold_package(package, &surface, &order);
-    let component_counts: Vec<usize> = package.blocks().map(|block| block.component_count as usize).collect();
-    let gathered = FoldedBlocks::gather(&folded, &component_counts);
+    let nearby = groups::nearby(package.rest_positions());
+    let nearby: Vec<u32> = nearby.iter().map(|&v| order.solver_from_vertex[v as usize]).collect();
+    let degree = |&v: &u32| surface.topology.ring_of(v as usize).len();
+    let degrees: Vec<usize> = order.vertex_from_solver.iter().map(degree).collect();
+    let lanes = LaneOrder::new(&folded, &nearby, &degrees);
+    let through = |via: &[u32], then: &[u32]| -> Vec<u32> { via.iter().map(|&i| then[i as usize]).collect() };
+    let vertex_from_lane = through(&lanes.solver_from_lane, &order.vertex_from_solver);
+    let lane_from_vertex = through(&order.solver_from_vertex, &lanes.lane_from_solver);
+    let rest = |&v: &u32| package.rest_positions()[v as usize];
+    let rest_positions: Vec<[f32; 3]> = vertex_from_lane.iter().map(rest).collect();
+    let rings = LaneRings::new(&laplacian, &vertex_from_lane, &lane_from_vertex);
+    let block_of_component: Vec<u32> = package.components().map(|component| component.block).collect();
+    let patches = lanes.patches(&folded, &block_of_component);
+    let fans = Fans::gather(package.faces(), &lane_from_vertex);
     let blocks: Vec<BakedBlock> = package
         .blocks()
         .map(|block| BakedBlock {
@@ -90,12 +98,14 @@ pub fn bake(package: &CompactView<'_>) -> Result<AlignedBytes, BakeError> {
     write_baked(&BakedBasis {
         compact_id: package.content_id(),
         faces: package.faces(),
-        solver_from_vertex: &order.solver_from_vertex,
-        vertex_from_solver: &order.vertex_from_solver,
+        lane_from_vertex: &lane_from_vertex,
+        vertex_from_lane: &vertex_from_lane,
         rotation_scale: package.rotation_scale(),
         stretch_scale: package.stretch_scale(),
         blocks: &blocks,
         components: &components,
+        fan_offsets: &fans.fan_offsets,
+        fans: &fans.fans,
         exact: BakedTier {
             rest_positions: &rest_positions,
             ring_offsets: &rings.offsets,
@@ -105,11 +115,11 @@ pub fn bake(package: &CompactView<'_>) -> Result<AlignedBytes, BakeError> {
             tile_rows: &factor.rows,
             tiles: &factor.tiles,
             inverse_diagonals: &factor.inverse_diagonals,
-            support_offsets: &gathered.support_offsets,
-            support: &gathered.support,
-            entry_offsets: &gathered.entry_offsets,
-            entry_slots: &gathered.entry_slots,
-            entry_values: &gathered.entry_values,
+            solver_from_lane: &lanes.solver_from_lane,
+            lane_from_solver: &lanes.lane_from_solver,
+            patch_offsets: &patches.patch_offsets,
+            patch_owners: &patches.patch_owners,
+            patch_values: &patches.patch_values,
         },
         fast: None,
     })
@@ -130,31 +140,31 @@ fn fold_package(package: &CompactView<'_>, surface: &Surface, order: &Eliminatio
     frame.fold(&sparse::unpack_components(package), &decoders, &value_scales)
 }
 
-/// One-rings and their weights in solver order, for the right-hand side.
-struct SolverRings {
+/// One-rings and their weights in lanes, for the right-hand side.
+struct LaneRings {
     offsets: Vec<u32>,
     ring: Vec<u32>,
     weights: Vec<f32>,
 }
 
-impl SolverRings {
-    fn new(laplacian: &AnchoredLaplacian<'_>, order: &EliminationOrder) -> Self {
+impl LaneRings {
+    fn new(laplacian: &AnchoredLaplacian<'_>, vertex_from_lane: &[u32], lane_from_vertex: &[u32]) -> Self {
         let mut rings = Self {
             offsets: vec![0],
             ring: Vec::new(),
             weights: Vec::new(),
         };
-        for &v in &order.vertex_from_solver {
+        for &v in vertex_from_lane {
             let row = laplacian.ring_offsets[v as usize] as usize..laplacian.ring_offsets[v as usize + 1] as usize;
             let mut entries: Vec<(u32, f32)> = row
                 .map(|e| {
                     (
-                        order.solver_from_vertex[laplacian.ring[e] as usize],
+                        lane_from_vertex[laplacian.ring[e] as usize],
                         laplacian.weights[e] as f32,
                     )
                 })
                 .collect();
-            entries.sort_unstable_by_key(|&(solver, _)| solver);
+            entries.sort_unstable_by_key(|&(lane, _)| lane);
             rings.ring.extend(entries.iter().map(|entry| entry.0));
             rings.weights.extend(entries.iter().map(|entry| entry.1));
             rings.offsets.push(rings.ring.len() as u32);
