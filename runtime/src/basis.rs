@@ -2,11 +2,12 @@
 
 use core::fmt;
 
-use sinew_formats::package::{BakedBlock, BakedView, FEATURE_COUNT, FastError, FastView, NONE, OpenError, TierView};
+use sinew_formats::package::{BakedBlock, BakedView, FastError, FastView, NONE, OpenError, TierView};
 
-use crate::simd::scalar::gradient::FeatureScales;
+use crate::simd::decode::{FeatureScales, Patches};
 use crate::simd::scalar::poisson::{Factor, Rings};
 use crate::simd::scalar::skin::Skin;
+use crate::simd::scalar::surface::{Around, Orders};
 
 /// A baked package, checked. Borrows the bytes; cheap to copy; may be shared between threads, each with its own workspace.
 #[derive(Clone, Copy)]
@@ -109,19 +110,19 @@ impl<'a> Basis<'a> {
         self.view.faces()
     }
 
-    /// Rest shape. Shape: `[V]`, **solver** order, units of the source.
+    /// Rest shape. Shape: `[V]`, in **lanes**: the order in which the frame path runs; units of the source.
     pub fn rest_positions(&self) -> &'a [[f32; 3]] {
         self.view.exact().rest_positions()
     }
 
-    /// Where a source vertex stands in solver order. Shape: `[V]`.
-    pub fn solver_from_vertex(&self) -> &'a [u32] {
-        self.view.solver_from_vertex()
+    /// Lane of each source vertex. Shape: `[V]`.
+    pub fn lane_from_vertex(&self) -> &'a [u32] {
+        self.view.lane_from_vertex()
     }
 
-    /// Source vertex of each solver index. Shape: `[V]`.
-    pub fn vertex_from_solver(&self) -> &'a [u32] {
-        self.view.vertex_from_solver()
+    /// Source vertex of each lane. Shape: `[V]`.
+    pub fn vertex_from_lane(&self) -> &'a [u32] {
+        self.view.vertex_from_lane()
     }
 
     /// Radians a network unit of log-rotation.
@@ -132,6 +133,23 @@ impl<'a> Basis<'a> {
     /// Stretch a network unit of stretch.
     pub fn stretch_scale(&self) -> f32 {
         self.view.stretch_scale()
+    }
+
+    /// How the triangles lie around the vertices.
+    pub(crate) fn around(&self) -> Around<'a> {
+        Around {
+            offsets: self.view.fan_offsets(),
+            fans: self.view.fans(),
+            vertex_from_lane: self.view.vertex_from_lane(),
+        }
+    }
+
+    /// The orders of the exact tier.
+    pub(crate) fn orders(&self) -> Orders<'a> {
+        Orders {
+            solver_from_lane: self.view.exact().solver_from_lane(),
+            vertex_from_lane: self.view.vertex_from_lane(),
+        }
     }
 
     /// Nodes of the fast tier, where the package has one.
@@ -166,7 +184,7 @@ pub(crate) struct Fast<'a> {
 }
 
 impl<'a> Fast<'a> {
-    /// What blend, decode and solve read.
+    /// What decode and solve read.
     pub(crate) fn nodes(&self) -> Tier<'a> {
         Tier {
             basis: self.basis,
@@ -177,10 +195,11 @@ impl<'a> Fast<'a> {
     /// How the vertices follow the nodes.
     pub(crate) fn skin(&self) -> Skin<'a> {
         Skin {
-            rest: self.view.rest_positions(),
+            rest: self.basis.rest_positions(),
             centre: self.view.centre(),
             nodes: self.view.skin_nodes(),
             weights: self.view.skin_weights(),
+            vertex_from_lane: self.basis.vertex_from_lane(),
         }
     }
 }
@@ -193,22 +212,8 @@ pub(crate) struct Tier<'a> {
 }
 
 impl<'a> Tier<'a> {
-    /// N.
-    pub(crate) fn node_count(&self) -> usize {
-        self.nodes.node_count()
-    }
-
-    pub(crate) fn block_count(&self) -> usize {
-        self.basis.block_count()
-    }
-
     pub(crate) fn block(&self, b: usize) -> BakedBlock {
         self.basis.view.block(b)
-    }
-
-    /// The block that component `k` is a latent of.
-    pub(crate) fn block_of(&self, k: usize) -> usize {
-        self.basis.view.component(k).block as usize
     }
 
     /// What a network feature means.
@@ -219,23 +224,22 @@ impl<'a> Tier<'a> {
         }
     }
 
-    /// Rest shape of the nodes. Shape: `[N]`, solver order.
+    /// Rest shape of the nodes. Shape: `[N]`, lanes.
     pub(crate) fn rest_positions(&self) -> &'a [[f32; 3]] {
         self.nodes.rest_positions()
     }
 
-    /// Nodes of block `b`, solver order.
-    pub(crate) fn support(&self, b: usize) -> &'a [u32] {
-        self.nodes.support_of(b)
+    /// Multiplies the halves of component `k`.
+    pub(crate) fn value_scale(&self, k: usize) -> f32 {
+        self.basis.view.component(k).value_scale
     }
 
-    /// Entries of component `k`.
-    pub(crate) fn entries(&self, k: usize) -> Entries<'a> {
-        let (slots, values) = self.nodes.entries_of(k);
-        Entries {
-            slots,
-            values,
-            scale: self.basis.view.component(k).value_scale,
+    /// The components.
+    pub(crate) fn patches(&self) -> Patches<'a> {
+        Patches {
+            offsets: self.nodes.patch_offsets(),
+            owners: self.nodes.patch_owners(),
+            values: self.nodes.patch_values(),
         }
     }
 
@@ -244,6 +248,7 @@ impl<'a> Tier<'a> {
             offsets: self.nodes.ring_offsets(),
             neighbours: self.nodes.ring(),
             weights: self.nodes.ring_weights(),
+            solver_from_lane: self.nodes.solver_from_lane(),
         }
     }
 
@@ -255,15 +260,6 @@ impl<'a> Tier<'a> {
             inverse_diagonals: self.nodes.inverse_diagonals(),
         }
     }
-}
-
-/// A component's sparse values: at place `slots[n]` of its block's support, `scale * values[n]`.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Entries<'a> {
-    pub(crate) slots: &'a [u32],
-    /// IEEE half bits.
-    pub(crate) values: &'a [[u16; FEATURE_COUNT]],
-    pub(crate) scale: f32,
 }
 
 #[cfg(test)]

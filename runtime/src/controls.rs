@@ -27,6 +27,22 @@ impl<'c> Controls<'c> {
         Ok(Self { basis, weights })
     }
 
+    /// Takes `weights` as they stand, for memory that outlived the controls in it. Shape: `[K]`.
+    ///
+    /// # Errors
+    /// [`ControlError::WrongLength`]; [`ControlError::NotFinite`] for the first weight that is no number, and then none is
+    /// changed.
+    pub fn resume(basis: &'c Basis<'c>, weights: &'c mut [f32]) -> Result<Self, ControlError> {
+        let (expected, actual) = (basis.component_count(), weights.len());
+        if actual != expected {
+            return Err(ControlError::WrongLength { expected, actual });
+        }
+        match weights.iter().position(|w| !w.is_finite()) {
+            Some(component) => Err(ControlError::NotFinite { component }),
+            None => Ok(Self { basis, weights }),
+        }
+    }
+
     /// Sets a control, clamped into its component's range; returns the weight it took.
     ///
     /// # Errors
@@ -96,6 +112,31 @@ mod tests {
         controls.reset();
         assert_eq!(controls.weights(), [0.0; Package::COMPONENTS]);
         assert_eq!(controls.basis().id(), basis.id());
+    }
+
+    #[test]
+    fn resumed_controls_stand_where_they_were_left() {
+        let package = Package::small(1);
+        let basis = open(&package);
+        let mut memory = [f32::NAN; Package::COMPONENTS];
+        Controls::new(&basis, &mut memory)
+            .unwrap()
+            .set_unclamped(2, 7.0)
+            .unwrap();
+        assert_eq!(
+            Controls::resume(&basis, &mut memory).unwrap().weights(),
+            [0.0, 0.0, 7.0, 0.0, 0.0]
+        );
+        memory[3] = f32::INFINITY;
+        assert_eq!(
+            Controls::resume(&basis, &mut memory).unwrap_err(),
+            ControlError::NotFinite { component: 3 }
+        );
+        let (expected, actual) = (Package::COMPONENTS, Package::COMPONENTS - 1);
+        assert_eq!(
+            Controls::resume(&basis, &mut memory[1..]).unwrap_err(),
+            ControlError::WrongLength { expected, actual }
+        );
     }
 
     #[test]

@@ -8,7 +8,8 @@ use std::vec::Vec;
 
 use half::f16;
 use sinew_formats::package::{
-    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedFast, BakedTier, FastError, NONE, write_baked,
+    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedFast, BakedTier, Fans, FastError, NONE, Patches,
+    write_baked,
 };
 
 use crate::basis::Basis;
@@ -16,11 +17,13 @@ use crate::simd::scalar::naive::Noise;
 use crate::simd::scalar::poisson::{BLOCK, Factor, Rings};
 use crate::workspace::{Workspace, WorkspaceLayout};
 
-/// A bumpy grid of triangles in a scrambled solver order, every edge of another weight.
+/// A bumpy grid of triangles in scrambled lanes and another order of elimination, every edge of another weight.
 pub(crate) struct Grid {
     pub(crate) rest: Vec<[f32; 3]>,
     pub(crate) faces: Vec<[u32; 3]>,
-    pub(crate) solver_from_vertex: Vec<u32>,
+    pub(crate) lane_from_vertex: Vec<u32>,
+    pub(crate) solver_from_lane: Vec<u32>,
+    /// A lane.
     pub(crate) anchor: usize,
     offsets: Vec<u32>,
     ring: Vec<u32>,
@@ -31,7 +34,7 @@ impl Grid {
     pub(crate) fn new(width: u32, height: u32) -> Self {
         let count = width * height;
         let stride = (2..).find(|n| gcd(*n, count) == 1).unwrap();
-        let solver_from_vertex: Vec<u32> = (0..count).map(|v| (v * stride + 1) % count).collect();
+        let lane_from_vertex: Vec<u32> = (0..count).map(|v| (v * stride + 1) % count).collect();
         let mut noise = Noise::new(100);
         let mut rest = vec![[0.0; 3]; count as usize];
         let mut faces = Vec::new();
@@ -39,7 +42,7 @@ impl Grid {
         for y in 0..height {
             for x in 0..width {
                 let v = y * width + x;
-                rest[solver_from_vertex[v as usize] as usize] = [x as f32, y as f32, 0.3 * noise.next()];
+                rest[lane_from_vertex[v as usize] as usize] = [x as f32, y as f32, 0.3 * noise.next()];
                 if x + 1 < width && y + 1 < height {
                     faces.push([v, v + 1, v + width]);
                     faces.push([v + 1, v + width + 1, v + width]);
@@ -48,10 +51,7 @@ impl Grid {
         }
         for face in &faces {
             for (a, b) in [(0, 1), (1, 2), (2, 0)] {
-                let (i, j) = (
-                    solver_from_vertex[face[a] as usize],
-                    solver_from_vertex[face[b] as usize],
-                );
+                let (i, j) = (lane_from_vertex[face[a] as usize], lane_from_vertex[face[b] as usize]);
                 let weight = 1.0 + 0.5 * noise.next();
                 rows[i as usize].insert(j, weight);
                 rows[j as usize].insert(i, weight);
@@ -67,7 +67,9 @@ impl Grid {
         Self {
             rest,
             faces,
-            solver_from_vertex,
+            lane_from_vertex,
+            // Seven divides no count of a test.
+            solver_from_lane: (0..count).map(|lane| (13 * lane + 3) % count).collect(),
             anchor: count as usize / 2,
             offsets,
             ring,
@@ -84,6 +86,7 @@ impl Grid {
             offsets: &self.offsets,
             neighbours: &self.ring,
             weights: &self.weights,
+            solver_from_lane: &self.solver_from_lane,
         }
     }
 
@@ -95,14 +98,25 @@ impl Grid {
         })
     }
 
-    /// Dense Laplacian with the anchor's penalty.
+    /// Rows in lanes to rows in solver order.
+    pub(crate) fn in_solver_order<T: Copy>(&self, lanes: &[T]) -> Vec<T> {
+        let mut rows = lanes.to_vec();
+        for (&solver, row) in self.solver_from_lane.iter().zip(lanes) {
+            rows[solver as usize] = *row;
+        }
+        rows
+    }
+
+    /// Dense Laplacian with the anchor's penalty, solver order.
     pub(crate) fn laplacian(&self) -> Vec<Vec<f64>> {
         let mut matrix = vec![vec![0.0; self.vertex_count()]; self.vertex_count()];
         for (i, j, weight) in self.edges_both_ways() {
+            let [i, j] = [i, j].map(|lane| self.solver_from_lane[lane] as usize);
             matrix[i][j] -= f64::from(weight);
             matrix[i][i] += f64::from(weight);
         }
-        matrix[self.anchor][self.anchor] += 6.0;
+        let anchor = self.solver_from_lane[self.anchor] as usize;
+        matrix[anchor][anchor] += 6.0;
         matrix
     }
 }
@@ -221,30 +235,36 @@ impl Package {
 
     /// A 6 by 5 grid; a root block of two components, child blocks of one and of two under them.
     pub(crate) fn small(seed: u64) -> Self {
-        Self::on(&Grid::new(6, 5), seed, false)
+        Self::on(&Grid::new(6, 5), seed, [7; 16], |k| format!("c{k}"), false)
     }
 
     /// The same with a fast tier whose nodes are all vertices, each followed by its own: both tiers play the same.
     pub(crate) fn small_with_fast_tier(seed: u64) -> Self {
-        Self::on(&Grid::new(6, 5), seed, true)
+        Self::on(&Grid::new(6, 5), seed, [7; 16], |k| format!("c{k}"), true)
     }
 
-    fn on(grid: &Grid, seed: u64, with_fast_tier: bool) -> Self {
+    /// What a second training might give: another identity, the names in another order, `c0` gone.
+    pub(crate) fn retrained(seed: u64) -> Self {
+        let names = ["c3", "c4", "new", "c1", "c2"];
+        Self::on(&Grid::new(6, 5), seed, [8; 16], |k| names[k].into(), false)
+    }
+
+    fn on(grid: &Grid, seed: u64, compact_id: [u8; 16], name: impl Fn(usize) -> String, with_fast_tier: bool) -> Self {
         let mut noise = Noise::new(seed);
         let count = grid.vertex_count() as u32;
-        let mut vertex_from_solver = vec![0; count as usize];
-        for (v, &s) in grid.solver_from_vertex.iter().enumerate() {
-            vertex_from_solver[s as usize] = v as u32;
+        let mut vertex_from_lane = vec![0; count as usize];
+        for (v, &s) in grid.lane_from_vertex.iter().enumerate() {
+            vertex_from_lane[s as usize] = v as u32;
         }
         let supports: [Vec<u32>; 3] = [
             (0..count).collect(),
-            (0..count).filter(|s| s % 3 != 1).collect(),
-            (0..count).filter(|s| s % 2 == 0).collect(),
+            (0..count).filter(|lane| lane % 3 != 1).collect(),
+            (0..count).filter(|lane| lane % 2 == 0).collect(),
         ];
         let (mut blocks, mut components) = (Vec::new(), Vec::new());
-        let (mut support_offsets, mut entry_offsets) = (vec![0], vec![0]);
-        let (mut support, mut slots, mut values) = (Vec::new(), Vec::new(), Vec::new());
-        let names: Vec<String> = (0..Self::COMPONENTS).map(|k| format!("c{k}")).collect();
+        let lane_from_solver = grid.in_solver_order(&(0..count).collect::<Vec<u32>>());
+        let mut entries = Vec::new();
+        let names: Vec<String> = (0..Self::COMPONENTS).map(name).collect();
         for (b, (parent, component_count)) in [(NONE, 2), (0, 1), (1, 2)].into_iter().enumerate() {
             blocks.push(BakedBlock {
                 level: u32::from(b > 0),
@@ -257,11 +277,10 @@ impl Package {
                 let k = components.len();
                 for slot in 0..supports[b].len() as u32 {
                     if !(slot as usize + k).is_multiple_of(5) {
-                        slots.push(slot);
-                        values.push(noise.features().map(|x| f16::from_f32(0.125 * x).to_bits()));
+                        let values = noise.features().map(|x| f16::from_f32(0.125 * x).to_bits());
+                        entries.push((k, b as u32, supports[b][slot as usize], values));
                     }
                 }
-                entry_offsets.push(slots.len() as u32);
                 components.push(BakedComponent {
                     name: &names[k],
                     block: b as u32,
@@ -270,9 +289,9 @@ impl Package {
                     value_scale: 4.0,
                 });
             }
-            support.extend(&supports[b]);
-            support_offsets.push(support.len() as u32);
         }
+        let patches = Patches::gather(grid.vertex_count(), entries);
+        let fans = Fans::gather(&grid.faces, &grid.lane_from_vertex);
         let factor = factorise(&grid.laplacian());
         let exact = BakedTier {
             rest_positions: &grid.rest,
@@ -283,20 +302,16 @@ impl Package {
             tile_rows: &factor.rows,
             tiles: &factor.tiles,
             inverse_diagonals: &factor.inverse_diagonals,
-            support_offsets: &support_offsets,
-            support: &support,
-            entry_offsets: &entry_offsets,
-            entry_slots: &slots,
-            entry_values: &values,
+            solver_from_lane: &grid.solver_from_lane,
+            lane_from_solver: &lane_from_solver,
+            patch_offsets: &patches.patch_offsets,
+            patch_owners: &patches.patch_owners,
+            patch_values: &patches.patch_values,
         };
-        let rest_in_source_order: Vec<[f32; 3]> =
-            grid.solver_from_vertex.iter().map(|&s| grid.rest[s as usize]).collect();
-        let own_nodes: Vec<[u16; 4]> = grid.solver_from_vertex.iter().map(|&s| [s as u16, 0, 1, 2]).collect();
         let fast = BakedFast {
             nodes: exact,
             centre: [2.5, 2.0, 0.0],
-            rest_positions: &rest_in_source_order,
-            skin_nodes: &own_nodes,
+            skin_nodes: &(0..count as u16).map(|lane| [lane, 0, 1, 2]).collect::<Vec<_>>(),
             skin_weights: &vec![[u16::MAX, 0, 0, 0]; count as usize],
             error: FastError {
                 mixed_rms: 1e-6,
@@ -309,18 +324,21 @@ impl Package {
             },
         };
         let bytes = write_baked(&BakedBasis {
-            compact_id: [7; 16],
+            compact_id,
             faces: &grid.faces,
-            solver_from_vertex: &grid.solver_from_vertex,
-            vertex_from_solver: &vertex_from_solver,
+            lane_from_vertex: &grid.lane_from_vertex,
+            vertex_from_lane: &vertex_from_lane,
             rotation_scale: 1.5,
             stretch_scale: 0.4,
             blocks: &blocks,
             components: &components,
+            fan_offsets: &fans.fan_offsets,
+            fans: &fans.fans,
             exact,
             fast: with_fast_tier.then_some(fast),
         })
         .unwrap();
+        let rest_in_source_order = grid.lane_from_vertex.iter().map(|&s| grid.rest[s as usize]).collect();
         Self {
             bytes,
             rest_in_source_order,

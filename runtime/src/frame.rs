@@ -1,13 +1,11 @@
 //! Frame: the steps in order, from controls to positions and normals. What has not changed is not computed again.
 
 use crate::basis::{Basis, Fast};
-use crate::blend::{blend, flushed};
 use crate::controls::Controls;
-use crate::decode::decode;
+use crate::decode::{Decoded, flushed};
 use crate::error::{Buffer, FrameError};
 use crate::fast::{emit_skinned, map_nodes};
-use crate::normals::check_length;
-use crate::simd::scalar::surface;
+use crate::normals::{check_length, write_normals};
 use crate::solve::{emit, solve};
 use crate::workspace::{TierChoice, Workspace};
 
@@ -68,23 +66,37 @@ impl Frame<'_> {
                 .for_each(|(to, from)| *to = from);
             let fast = fast_of(self.basis, workspace);
             let tier = fast.map_or_else(|| self.basis.exact(), |fast| fast.nodes());
-            blend(&tier, workspace.weights, workspace.pre_activations, workspace.features);
-            decode(&tier, workspace.features, workspace.gradients);
+            let decoded = Decoded {
+                shares: workspace.shares,
+                blocks: workspace.blocks,
+                gradients: workspace.gradients,
+            };
+            decoded.update(
+                &tier,
+                workspace.kernels,
+                workspace.weights,
+                workspace.gradients_are_stale,
+            );
+            workspace.gradients_are_stale = false;
             solve(workspace.kernels, &tier, workspace.gradients, workspace.displacement);
             if let Some(fast) = fast {
                 map_nodes(&fast, workspace.gradients, workspace.displacement, workspace.maps);
             }
             FrameOutcome::Solved
         };
-        let emitted = match fast_of(self.basis, workspace) {
-            Some(fast) => emit_skinned(workspace.kernels, &fast, workspace.maps, self.positions),
-            None => emit(self.basis, workspace.displacement, self.positions),
+        let (bounds, emitted) = match fast_of(self.basis, workspace) {
+            Some(fast) => {
+                let (maps, posed) = (&*workspace.maps, &mut *workspace.posed);
+                emit_skinned(workspace.kernels, &fast, maps, posed, self.positions)
+            }
+            None => emit(self.basis, workspace.displacement, workspace.posed, self.positions),
         };
+        workspace.bounds = bounds;
         if emitted.is_err() {
             workspace.rest();
         }
         if let Some(normals) = self.normals {
-            surface::normals(self.basis.faces(), self.positions, normals);
+            write_normals(self.basis, workspace.kernels, workspace.posed, normals);
         }
         emitted.map(|()| outcome)
     }
@@ -204,7 +216,7 @@ mod tests {
             positions: &positions,
             normals: &mut own,
         }
-        .run()
+        .run(&mut workspace)
         .unwrap();
         assert_eq!(own, normals);
         assert!(own.iter().all(|n| *n != FALLBACK_NORMAL));
@@ -226,30 +238,77 @@ mod tests {
     }
 
     #[test]
-    fn overflow_gives_the_rest_mesh_and_leaves_the_workspace_usable() {
+    fn weights_without_measure_saturate() {
+        let package = Package::small(1);
+        let basis = open(&package);
+        let mut memory = memory_for(&basis);
+        let mut workspace = workspace_in(&basis, &mut memory);
+        for weights in [
+            [f32::MAX, 0.0, 0.0, 0.0, 0.0],
+            [f32::MAX, f32::MIN, f32::MAX, f32::MIN, 1.0],
+        ] {
+            let (outcome, positions, normals) = frame(&basis, &weights, &mut workspace);
+            assert_eq!(outcome, Ok(FrameOutcome::Solved));
+            let mut numbers = positions.as_flattened().iter().chain(normals.as_flattened());
+            assert!(numbers.all(|x| x.is_finite()));
+        }
+    }
+
+    #[test]
+    fn a_lost_position_gives_the_rest_mesh_and_leaves_the_workspace_usable() {
         let package = Package::small(1);
         let basis = open(&package);
         let mut memory = memory_for(&basis);
         let mut workspace = workspace_in(&basis, &mut memory);
         let before = frame(&basis, &WEIGHTS, &mut workspace).1;
-        // One overflowing weight saturates tanh, which is finite; two are infinity less infinity.
-        let (outcome, positions, normals) = frame(&basis, &[f32::MAX, 0.0, 0.0, 0.0, 0.0], &mut workspace);
-        assert_eq!(outcome, Ok(FrameOutcome::Solved));
-        assert!(
-            positions
-                .as_flattened()
-                .iter()
-                .chain(normals.as_flattened())
-                .all(|x| x.is_finite())
-        );
-
-        let (outcome, positions, normals) = frame(&basis, &[f32::MAX, f32::MAX, 0.0, 0.0, 0.0], &mut workspace);
+        // As a solve leaves it whose factor grows beyond f32.
+        workspace.displacement[3][1] = f32::INFINITY;
+        let (outcome, positions, normals) = frame(&basis, &WEIGHTS, &mut workspace);
         assert!(matches!(outcome, Err(FrameError::NotFinite { vertex }) if vertex < basis.vertex_count()));
         assert_eq!(positions, package.rest_in_source_order);
         assert!(normals.as_flattened().iter().all(|x| x.is_finite()));
         assert!(workspace.weights().iter().all(|&w| w == 0.0));
 
         assert_eq!(frame(&basis, &WEIGHTS, &mut workspace).1, before);
+    }
+
+    #[test]
+    fn bounds_hold_the_positions_tightly() {
+        let package = Package::small(1);
+        let basis = open(&package);
+        let mut memory = memory_for(&basis);
+        let mut workspace = workspace_in(&basis, &mut memory);
+        let (_, positions, _) = frame(&basis, &WEIGHTS, &mut workspace);
+        let bounds = workspace.bounds();
+        for c in 0..3 {
+            let coordinates = || positions.iter().map(|p| p[c]);
+            assert_eq!(bounds.minimum[c], coordinates().fold(f32::INFINITY, f32::min));
+            assert_eq!(bounds.maximum[c], coordinates().fold(f32::NEG_INFINITY, f32::max));
+        }
+    }
+
+    #[test]
+    fn a_frame_after_other_jobs_is_the_same_frame() {
+        let package = Package::small(1);
+        let basis = open(&package);
+        let (mut one, mut two) = (memory_for(&basis), memory_for(&basis));
+        let (mut workspace, mut fresh) = (workspace_in(&basis, &mut one), workspace_in(&basis, &mut two));
+        frame(&basis, &WEIGHTS, &mut workspace).0.unwrap();
+        let mut displacement = vec![[0.0; 3]; basis.vertex_count()];
+        let tangent = crate::Tangent {
+            basis: &basis,
+            component: 1,
+            displacement: &mut displacement,
+        };
+        tangent.run(&mut workspace).unwrap();
+        let mut moved = WEIGHTS;
+        moved[3] += 0.25;
+        let found = frame(&basis, &moved, &mut workspace);
+        assert_eq!(found, frame(&basis, &moved, &mut fresh), "all groups are decoded again");
+        moved[3] -= 0.125;
+        let (found, mut again) = (frame(&basis, &moved, &mut workspace), memory_for(&basis));
+        let mut newest = workspace_in(&basis, &mut again);
+        assert_eq!(found, frame(&basis, &moved, &mut newest), "its own groups are");
     }
 
     #[test]
@@ -381,7 +440,11 @@ mod tests {
             displacement: &mut output,
         };
         assert_eq!(tangent.run(&mut workspace), Err(FrameError::NeedsExactTier));
-        let features = vec![[0.0; crate::FEATURE_COUNT]; basis.vertex_count()];
+        let mut features = vec![[9.0; crate::FEATURE_COUNT]; basis.vertex_count()];
+        assert_eq!(
+            workspace.features(&basis, &mut features),
+            Err(FrameError::NeedsExactTier)
+        );
         let reconstruct = crate::Reconstruct {
             basis: &basis,
             features: &features,

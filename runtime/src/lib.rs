@@ -1,10 +1,12 @@
 //! Sinew's runtime: weights of deformation components in, a deformed mesh out. `no_std`, no allocation, memory from the
 //! caller; every check that costs more than O(controls) happens once, in [`Basis::open`].
 //!
-//! Path of data, a frame: [`Controls`] -> blend (sparse folded components, tanh) -> decode (deformation gradients) ->
+//! Path of data, a frame: [`Controls`] -> decode (sparse blend of folded components, tanh, deformation gradients) ->
 //! solve (right-hand side, `L d = b`) -> positions -> [`Normals`]. [`Frame`] runs it; [`Tangent`] is its derivative along
-//! one control; [`Reconstruct`] enters it behind the network, with features of one's own. A workspace of the fast tier
-//! ([`TierChoice`]) runs the same path on a few nodes and skins the vertices to them: for crowds and small devices.
+//! one control; [`Reconstruct`] enters it behind the network, with features of one's own.
+//!
+//! A workspace of the fast tier ([`TierChoice`]) runs the same path on a few nodes and lets the vertices follow them: for
+//! crowds and small devices.
 //!
 //! ```no_run
 //! use sinew_runtime::{Basis, Controls, Frame, Workspace, WorkspaceLayout};
@@ -28,7 +30,6 @@
 extern crate std;
 
 mod basis;
-mod blend;
 mod controls;
 mod decode;
 mod error;
@@ -40,6 +41,7 @@ mod normals;
 mod reconstruct;
 mod simd;
 mod solve;
+pub mod take;
 mod workspace;
 
 #[cfg(test)]
@@ -53,6 +55,6 @@ pub use linearize::Tangent;
 pub use normals::Normals;
 pub use reconstruct::Reconstruct;
 pub use simd::Kernels;
-pub use simd::scalar::surface::FALLBACK_NORMAL;
+pub use simd::scalar::surface::{Bounds, FALLBACK_NORMAL};
 pub use sinew_formats::package::{FEATURE_COUNT, FastError, OpenError};
 pub use workspace::{TierChoice, Workspace, WorkspaceLayout};

@@ -2,11 +2,9 @@
 //! positions by Gauss-Newton, offline and on dragged vertices.
 
 use crate::basis::Basis;
-use crate::blend::blend_block;
+use crate::decode::decoder;
 use crate::error::{Buffer, FrameError};
 use crate::normals::check_length;
-use crate::simd::scalar::blend::activate_tangent;
-use crate::simd::scalar::gradient::gradient_tangent;
 use crate::solve::solve;
 use crate::workspace::Workspace;
 
@@ -50,30 +48,17 @@ impl Tangent<'_> {
     /// Those of [`Tangent::validate`]; [`FrameError::NotFinite`] when the derivative overflows: then the output is zero.
     pub fn run(self, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
         self.validate(workspace)?;
-        let Workspace {
-            kernels,
-            weights,
-            features,
-            pre_activations,
-            gradients,
-            solution,
-            ..
-        } = workspace;
         let tier = self.basis.exact();
-        let b = tier.block_of(self.component);
-        let bias = tier.block(b).bias;
-        // The features are the sum of all blocks; the tanh of this one needs its own blend back.
-        let pre = blend_block(&tier, b, weights, pre_activations);
-        let support = tier.support(b);
-        let entries = tier.entries(self.component);
-        gradients.fill([[0.0; 4]; 3]);
-        for (&slot, value) in entries.slots.iter().zip(entries.values) {
-            let v = support[slot as usize] as usize;
-            let dx = activate_tangent(&bias, &pre[slot as usize], value, entries.scale);
-            gradients[v] = gradient_tangent(tier.scales(), &features[v], &dx);
-        }
-        solve(*kernels, &tier, gradients, solution);
-        for (d, &v) in solution.iter().zip(self.basis.vertex_from_solver()) {
+        let decoder = decoder(&tier, workspace.shares, workspace.blocks, true);
+        let gradients = &mut *workspace.gradients;
+        workspace.gradients_are_stale = true;
+        let scale = tier.value_scale(self.component);
+        workspace.kernels.tangents(&decoder, self.component, scale, gradients);
+        let solution = &mut *workspace.solution;
+        solve(workspace.kernels, &tier, gradients, solution);
+        let orders = self.basis.orders();
+        for (&solver, &v) in orders.solver_from_lane.iter().zip(orders.vertex_from_lane) {
+            let d = &solution[solver as usize];
             if !d.iter().all(|x| x.is_finite()) {
                 self.displacement.fill([0.0; 3]);
                 return Err(FrameError::NotFinite { vertex: v as usize });

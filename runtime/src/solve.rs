@@ -2,13 +2,14 @@
 
 use crate::basis::{Basis, Tier};
 use crate::error::FrameError;
-use crate::simd::scalar::poisson::{Block, Factor, Gradient, Lane, Rings};
-use crate::simd::scalar::surface::scatter;
+use crate::simd::lanes::Gradient;
+use crate::simd::scalar::poisson::{Block, Factor, Lane, Rings};
+use crate::simd::scalar::surface::{Bounds, scatter};
 use crate::simd::{Kernels, scalar};
 #[cfg(target_arch = "x86_64")]
 use crate::simd::{avx2, avx512};
 
-/// Solves `L d = b(D)`. Shape: `gradients` `[N]`, `displacement` `[4 T]`, zero after the last node; solver order.
+/// Solves `L d = b(D)`. Shape: `gradients` `[N]`, lanes; `displacement` `[4 T]`, solver order, zero after the last node.
 pub(crate) fn solve(kernels: Kernels, tier: &Tier<'_>, gradients: &[Gradient], displacement: &mut [Lane]) {
     let rest = tier.rest_positions();
     displacement[rest.len()..].fill([0.0; 4]);
@@ -42,18 +43,25 @@ pub(crate) fn substitute(kernels: Kernels, factor: &Factor<'_>, x: &mut [Block])
     }
 }
 
-/// Writes rest shape plus displacement in source order.
+/// Writes rest shape plus displacement in source order and in lanes; gives the bounding box of what it wrote.
 ///
-/// Errors: [`FrameError::NotFinite`], and then `positions` holds the rest shape.
-pub(crate) fn emit(basis: &Basis<'_>, displacement: &[Lane], positions: &mut [[f32; 3]]) -> Result<(), FrameError> {
-    let (rest, order) = (basis.rest_positions(), basis.vertex_from_solver());
-    let Err(vertex) = scatter(rest, displacement, order, positions) else {
-        return Ok(());
+/// Errors: [`FrameError::NotFinite`], and then the output holds the rest shape.
+pub(crate) fn emit(
+    basis: &Basis<'_>,
+    displacement: &[Lane],
+    posed: &mut [[f32; 4]],
+    positions: &mut [[f32; 3]],
+) -> (Bounds, Result<(), FrameError>) {
+    let (rest, orders) = (basis.rest_positions(), basis.orders());
+    let vertex = match scatter(rest, displacement, orders, posed, positions) {
+        Ok(bounds) => return (bounds, Ok(())),
+        Err(vertex) => vertex as usize,
     };
-    for (r, &v) in rest.iter().zip(order) {
+    let mut bounds = Bounds::EMPTY;
+    for ((r, posed), &v) in rest.iter().zip(posed).zip(orders.vertex_from_lane) {
         positions[v as usize] = *r;
+        *posed = [r[0], r[1], r[2], 0.0];
+        bounds.include(r);
     }
-    Err(FrameError::NotFinite {
-        vertex: vertex as usize,
-    })
+    (bounds, Err(FrameError::NotFinite { vertex }))
 }

@@ -2,13 +2,18 @@
 //!
 //! A workspace always holds a pose that is finite and whole: the rest pose when new, then that of the last frame.
 
-use sinew_formats::package::FEATURE_COUNT;
+use sinew_formats::package::{FEATURE_COUNT, GROUP_NODES};
 
-use crate::basis::{Basis, Tier};
-use crate::error::{FrameError, WorkspaceError};
+use crate::basis::Basis;
+use crate::decode::decoder;
+use crate::error::{Buffer, FrameError, WorkspaceError};
+use crate::normals::check_length;
 use crate::simd::Kernels;
-use crate::simd::scalar::poisson::{BLOCK, Gradient, Lane};
+use crate::simd::decode::{BlockRest, Share};
+use crate::simd::lanes::Gradient;
+use crate::simd::scalar::poisson::{BLOCK, Lane};
 use crate::simd::scalar::skin::Map;
+use crate::simd::scalar::surface::Bounds;
 
 /// Start of every buffer: a cache line, and the widest vector register.
 const ALIGNMENT: usize = 64;
@@ -34,13 +39,13 @@ pub struct WorkspaceLayout {
 }
 
 impl WorkspaceLayout {
-    /// Layout for the exact tier of `basis`: about 152 bytes a vertex.
+    /// Layout for the exact tier of `basis`: about 96 bytes a vertex.
     pub fn for_basis(basis: &Basis<'_>) -> Self {
         Sections::exact(basis).layout()
     }
 
-    /// Layout for a tier of `basis`: the fast one takes about 200 bytes a node, which is 25 a vertex with a node for every
-    /// eight.
+    /// Layout for a tier of `basis`. The fast one takes 16 bytes a vertex and 128 a node: a third of the exact one's with a
+    /// node for every eight vertices.
     ///
     /// # Errors
     /// [`WorkspaceError::NoFastTier`].
@@ -57,45 +62,40 @@ impl WorkspaceLayout {
 /// Element counts of the buffers, in the order in which they lie in memory.
 struct Sections {
     components: usize,
+    blocks: usize,
     nodes: usize,
-    largest_support: usize,
     /// Nodes of the solve that is not the pose's: none in the fast tier.
     solved_aside: usize,
     /// Nodes that vertices follow: none in the exact tier.
     maps: usize,
+    vertices: usize,
 }
 
 impl Sections {
     fn exact(basis: &Basis<'_>) -> Self {
-        let tier = basis.exact();
+        let vertices = basis.vertex_count();
         Self {
-            solved_aside: tier.node_count(),
+            components: basis.component_count(),
+            blocks: basis.block_count(),
+            nodes: vertices,
+            solved_aside: vertices,
             maps: 0,
-            ..Self::shared(basis, &tier)
+            vertices,
         }
     }
 
     fn of(basis: &Basis<'_>, tier: TierChoice) -> Result<Self, WorkspaceError> {
+        let exact = Self::exact(basis);
         if tier == TierChoice::Exact {
-            return Ok(Self::exact(basis));
+            return Ok(exact);
         }
-        let nodes = basis.fast().ok_or(WorkspaceError::NoFastTier)?.nodes();
+        let nodes = basis.fast_node_count().ok_or(WorkspaceError::NoFastTier)?;
         Ok(Self {
+            nodes,
             solved_aside: 0,
-            maps: nodes.node_count(),
-            ..Self::shared(basis, &nodes)
+            maps: nodes,
+            ..exact
         })
-    }
-
-    fn shared(basis: &Basis<'_>, tier: &Tier<'_>) -> Self {
-        let supports = (0..tier.block_count()).map(|b| tier.support(b).len());
-        Self {
-            components: basis.component_count(),
-            nodes: tier.node_count(),
-            largest_support: supports.max().unwrap_or(0),
-            solved_aside: 0,
-            maps: 0,
-        }
     }
 
     fn layout(&self) -> WorkspaceLayout {
@@ -110,15 +110,20 @@ impl Sections {
         self.nodes.next_multiple_of(BLOCK)
     }
 
+    fn padded_aside(&self) -> usize {
+        self.solved_aside.next_multiple_of(BLOCK)
+    }
+
     /// The limits of the format keep this under a gigabyte, which fits 32 bits.
     fn size_bytes(&self) -> usize {
         section_bytes::<f32>(self.components)
-            + section_bytes::<[f32; FEATURE_COUNT]>(self.nodes)
-            + section_bytes::<[f32; FEATURE_COUNT]>(self.largest_support)
+            + section_bytes::<Share>(self.components)
+            + section_bytes::<BlockRest>(self.blocks)
             + section_bytes::<Gradient>(self.nodes)
             + section_bytes::<Lane>(self.padded_nodes())
-            + section_bytes::<Lane>(self.solved_aside.next_multiple_of(BLOCK))
+            + section_bytes::<Lane>(self.padded_aside())
             + section_bytes::<Map>(self.maps)
+            + section_bytes::<[f32; 4]>(self.vertices)
     }
 }
 
@@ -132,23 +137,29 @@ fn section_bytes<T>(count: usize) -> usize {
 pub struct Workspace<'w> {
     basis_id: [u8; 16],
     /// What the buffers are for; the basis has it.
-    pub(crate) tier: TierChoice,
+    tier: TierChoice,
     /// What the frame path runs on; present on this machine.
     pub(crate) kernels: Kernels,
     /// Weights of the pose, tiny ones flushed. Shape: `[K]`.
     pub(crate) weights: &'w mut [f32],
-    /// Features of the pose, network units. Shape: `[N]`, solver order.
-    pub(crate) features: &'w mut [[f32; FEATURE_COUNT]],
+    /// What the components count in the pose. Shape: `[K]`.
+    pub(crate) shares: &'w mut [Share],
+    /// Constants of the basis and the kernels. Shape: `[B]`.
+    pub(crate) blocks: &'w mut [BlockRest],
+    /// `D = T - I` of the pose, or scratch. Shape: `[N]`, lanes.
+    pub(crate) gradients: &'w mut [Gradient],
+    /// Whether another job has used the gradients since the last frame.
+    pub(crate) gradients_are_stale: bool,
     /// Displacement of the pose, zero after the last node. Shape: `[4 T]`, solver order.
     pub(crate) displacement: &'w mut [Lane],
-    /// Scratch: a block's blend. Shape: `[largest support]`.
-    pub(crate) pre_activations: &'w mut [[f32; FEATURE_COUNT]],
-    /// Scratch: `D = T - I` or its derivative. Shape: `[N]`, solver order.
-    pub(crate) gradients: &'w mut [Gradient],
     /// Scratch: a solve that is not the pose's. Shape: that of `displacement`; empty in the fast tier.
     pub(crate) solution: &'w mut [Lane],
-    /// Maps of the pose. Shape: `[N]`, solver order; empty in the exact tier.
+    /// Maps of the pose. Shape: `[N]`, lanes; empty in the exact tier.
     pub(crate) maps: &'w mut [Map],
+    /// Scratch: positions for the normals. Shape: `[V]`, lanes.
+    pub(crate) posed: &'w mut [[f32; 4]],
+    /// Box of the positions last written.
+    pub(crate) bounds: Bounds,
 }
 
 impl<'w> Workspace<'w> {
@@ -194,31 +205,58 @@ impl<'w> Workspace<'w> {
         let memory = &mut memory[skipped..required_bytes];
         memory.fill(0);
         let (weights, memory) = carve(memory, sections.components);
-        let (features, memory) = carve(memory, sections.nodes);
-        let (displacement, memory) = carve(memory, sections.padded_nodes());
-        let (pre_activations, memory) = carve(memory, sections.largest_support);
+        let (shares, memory) = carve(memory, sections.components);
+        let (blocks, memory) = carve::<BlockRest>(memory, sections.blocks);
         let (gradients, memory) = carve(memory, sections.nodes);
-        let (solution, memory) = carve(memory, sections.solved_aside.next_multiple_of(BLOCK));
-        let (maps, _) = carve(memory, sections.maps);
+        let (displacement, memory) = carve(memory, sections.padded_nodes());
+        let (solution, memory) = carve(memory, sections.padded_aside());
+        let (maps, memory) = carve(memory, sections.maps);
+        let (posed, _) = carve(memory, sections.vertices);
+        for (b, block) in blocks.iter_mut().enumerate() {
+            block.bias = basis.exact().block(b).bias;
+        }
+        kernels.rest_activations(blocks);
         let basis_id = basis.id();
         Ok(Self {
             basis_id,
             tier,
             kernels,
             weights,
-            features,
-            displacement,
-            pre_activations,
+            shares,
+            blocks,
             gradients,
+            gradients_are_stale: false,
+            displacement,
             solution,
             maps,
+            posed,
+            bounds: Bounds::EMPTY,
         })
     }
 
-    /// Features of the pose, in network units; zero where no component reaches. Shape: `[V]`, **solver** order; in the fast
-    /// tier `[N]`, those of its nodes.
-    pub fn features(&self) -> &[[f32; FEATURE_COUNT]] {
-        self.features
+    /// Computes the features of the pose again, in network units; zero where no component reaches. Shape: `[V]`, source
+    /// order.
+    ///
+    /// # Errors
+    /// [`FrameError::ForeignWorkspace`], [`FrameError::NeedsExactTier`], [`FrameError::WrongLength`].
+    pub fn features(&self, basis: &Basis<'_>, features: &mut [[f32; FEATURE_COUNT]]) -> Result<(), FrameError> {
+        self.validate_exact(basis)?;
+        check_length(basis, Buffer::Features, features.len())?;
+        let tier = basis.exact();
+        let decoder = decoder(&tier, self.shares, self.blocks, true);
+        let mut group = [[0.0; GROUP_NODES]; FEATURE_COUNT];
+        for (g, vertices) in basis.vertex_from_lane().chunks(GROUP_NODES).enumerate() {
+            self.kernels.features(&decoder, g, &mut group);
+            for (n, &v) in vertices.iter().enumerate() {
+                features[v as usize] = group.map(|row| row[n]);
+            }
+        }
+        Ok(())
+    }
+
+    /// Bounding box of the positions that the last job wrote: holds nothing, infinite and turned over, before the first.
+    pub fn bounds(&self) -> Bounds {
+        self.bounds
     }
 
     /// Weights of the pose; those under 1e-6 count as zero. Shape: `[K]`.
@@ -239,7 +277,9 @@ impl<'w> Workspace<'w> {
     /// Back to rest, which is exact.
     pub(crate) fn rest(&mut self) {
         self.weights.fill(0.0);
-        self.features.fill([0.0; FEATURE_COUNT]);
+        self.shares.fill(Share::default());
+        self.gradients.fill([[0.0; 4]; 3]);
+        self.gradients_are_stale = false;
         self.displacement.fill([0.0; 4]);
         self.maps.fill([[0.0; 4]; 4]);
     }
@@ -286,8 +326,9 @@ mod tests {
         for start in 0..70 {
             let workspace = Workspace::new(&basis, &mut memory[start..start + layout.unaligned_bytes()]).unwrap();
             assert_eq!(workspace.weights.len(), basis.component_count());
-            assert_eq!(workspace.features().len(), basis.vertex_count());
-            assert!(workspace.features().iter().all(|x| *x == [0.0; FEATURE_COUNT]));
+            let mut features = vec![[1.0; FEATURE_COUNT]; basis.vertex_count()];
+            workspace.features(&basis, &mut features).unwrap();
+            assert_eq!(features, vec![[0.0; FEATURE_COUNT]; basis.vertex_count()]);
             assert_eq!(workspace.gradients.as_ptr().align_offset(ALIGNMENT), 0);
             assert_eq!(workspace.solution.as_ptr().align_offset(ALIGNMENT), 0);
         }
@@ -363,9 +404,9 @@ mod tests {
         let package = Package::small(1);
         let basis = open(&package);
         let layout = WorkspaceLayout::for_basis(&basis);
-        let exact = 4 * basis.component_count() + 152 * basis.vertex_count();
+        let exact = 12 * basis.component_count() + 72 * basis.block_count() + 96 * basis.vertex_count();
         assert!(
-            layout.size_bytes <= exact + 6 * layout.alignment,
+            layout.size_bytes <= exact + 8 * layout.alignment,
             "{} {exact}",
             layout.size_bytes
         );

@@ -177,7 +177,11 @@ fn a_workspace_of_the_fast_tier_is_small() {
         bytes_of(TierChoice::Exact),
         WorkspaceLayout::for_basis(&basis).size_bytes
     );
-    let limit = 200 * basis.fast_node_count().unwrap() + 4 * basis.component_count() + 6 * 64;
+    let limit = 16 * basis.vertex_count()
+        + 128 * basis.fast_node_count().unwrap()
+        + 12 * basis.component_count()
+        + 72 * basis.block_count()
+        + 9 * 64;
     assert!(
         bytes_of(TierChoice::Fast) <= limit,
         "{} {limit}",

@@ -1,36 +1,50 @@
-//! Which crate may know which: formats <- runtime, formats and runtime <- trainer, all <- tests; and what the runtime
-//! may pull in. An arrow not listed here is a change of architecture.
+//! Which crate may know which: formats <- runtime, formats and runtime <- capi and trainer, all <- tests; and what the
+//! runtime may pull in. An arrow not listed here is a change of architecture.
 
-use std::{collections::BTreeSet, process::Command};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+    process::Command,
+};
 
 use serde_json::Value;
 use sinew_tests::workspace_folder;
 
 /// `(crate, what it may depend on)`, within the workspace.
-const ARROWS: [(&str, &[&str]); 6] = [
+const ARROWS: &[(&str, &[&str])] = &[
     ("sinew-formats", &[]),
     ("sinew-runtime", &["sinew-formats"]),
+    ("sinew-capi", &["sinew-formats", "sinew-runtime"]),
     ("sinew-bake", &["sinew-formats"]),
     ("sinew-synthesize", &["sinew-formats"]),
+    ("sinew-peers", &["sinew-formats", "sinew-bake", "sinew-synthesize"]),
     (
         "sinew-trainer",
         &["sinew-formats", "sinew-runtime", "sinew-bake", "sinew-synthesize"],
     ),
-    ("sinew-tests", &["sinew-formats", "sinew-runtime", "sinew-trainer"]),
+    ("sinew-checksum", &["sinew-formats", "sinew-runtime"]),
+    (
+        "sinew-tests",
+        &["sinew-checksum", "sinew-formats", "sinew-runtime", "sinew-trainer"],
+    ),
 ];
 
 /// What a crate may use in its tests and benchmarks besides: the runtime's benchmarks play packages baked on the spot.
-const DEVELOPMENT_ARROWS: [(&str, &[&str]); 1] = [("sinew-runtime", &["sinew-bake", "sinew-synthesize"])];
+const DEVELOPMENT_ARROWS: &[(&str, &[&str])] = &[("sinew-runtime", &["sinew-peers"])];
 
 /// Everything that the runtime links, all of it without std.
-const RUNTIME_CLOSURE: [&str; 18] = [
+const RUNTIME_CLOSURE: &[&str] = &[
     "bytecheck",
     "bytemuck",
+    "byteorder",
     "cfg-if",
     "cpufeatures",
+    "cobs",
     "crc",
     "crc-catalog",
     "half",
+    "hash32",
+    "heapless",
     "libm",
     "munge",
     "ptr_meta",
@@ -40,6 +54,8 @@ const RUNTIME_CLOSURE: [&str; 18] = [
     "simdutf8",
     "sinew-formats",
     "sinew-runtime",
+    "stable_deref_trait",
+    "thiserror",
     "xxhash-rust",
     "zerocopy",
 ];
@@ -124,5 +140,38 @@ fn the_cores_switch_nothing_on_that_needs_std() {
         let tree = cargo(&arguments);
         let std: Vec<_> = tree.lines().filter(|line| line.contains("feature \"std\"")).collect();
         assert!(std.is_empty(), "{package}: {std:?}");
+    }
+}
+
+/// Packages of a lock file: name to version. Those that need two versions have one of them here.
+fn locked(folder: &str) -> BTreeMap<String, String> {
+    let path = workspace_folder().join(folder).join("Cargo.lock");
+    let text = fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let value = |line: Option<&str>, key: &str| Some(line?.strip_prefix(key)?.trim_matches('"').to_owned());
+    let packages = text.split("[[package]]").filter_map(|package| {
+        let mut lines = package.trim_start().lines();
+        Some((value(lines.next(), "name = ")?, value(lines.next(), "version = ")?))
+    });
+    packages.collect()
+}
+
+#[test]
+fn other_targets_lock_the_versions_of_the_workspace() {
+    let workspace = locked(".");
+    for folder in ["runtime/web", "runtime/cortex-m7"] {
+        let outside = locked(folder);
+        assert!(
+            outside.contains_key("sinew-runtime"),
+            "{folder}: the lock file was read"
+        );
+        for name in RUNTIME_CLOSURE {
+            if let Some(version) = outside.get(name) {
+                assert_eq!(
+                    Some(version),
+                    workspace.get(name),
+                    "{folder}/Cargo.lock, {name}: copy the root's Cargo.lock there and build"
+                );
+            }
+        }
     }
 }

@@ -62,12 +62,14 @@ fn describe_baked(view: &BakedView<'_>) -> String {
     let mut line = |name: &str, value: &dyn Debug| writeln!(text, "{name} = {value:?}").unwrap();
     line("compact_id", &view.compact_id());
     line("faces", &view.faces());
-    line("solver_from_vertex", &view.solver_from_vertex());
-    line("vertex_from_solver", &view.vertex_from_solver());
+    line("lane_from_vertex", &view.lane_from_vertex());
+    line("vertex_from_lane", &view.vertex_from_lane());
     line("rotation_scale", &view.rotation_scale());
     line("stretch_scale", &view.stretch_scale());
     view.blocks().for_each(|block| line("block", &block));
     view.components().for_each(|component| line("component", &component));
+    line("fan_offsets", &view.fan_offsets());
+    line("fans", &view.fans());
     for (name, tier) in [
         ("exact", Some(view.exact())),
         ("fast", view.fast().map(|fast| fast.nodes())),
@@ -88,11 +90,11 @@ fn describe_tier(tier: &TierView<'_>, line: &mut dyn FnMut(&str, &dyn Debug)) {
     line("tile_rows", &tier.tile_rows());
     line("tiles", &tier.tiles());
     line("inverse_diagonals", &tier.inverse_diagonals());
-    line("support_offsets", &tier.support_offsets());
-    line("support", &tier.support());
-    line("entry_offsets", &tier.entry_offsets());
-    line("entry_slots", &tier.entry_slots());
-    line("entry_values", &tier.entry_values());
+    line("solver_from_lane", &tier.solver_from_lane());
+    line("lane_from_solver", &tier.lane_from_solver());
+    line("patch_offsets", &tier.patch_offsets());
+    line("patch_owners", &tier.patch_owners());
+    line("patch_values", &tier.patch_values());
 }
 
 #[test]

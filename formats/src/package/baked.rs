@@ -1,8 +1,9 @@
 //! The baked payload: everything the frame path reads, in the order it reads it. Written by the baker, opened by the
 //! runtime without allocating.
 //!
-//! Vertices carry two numbers: the source order (`vertex`) and the elimination order of the factor (`solver`). Decode,
-//! right-hand side and solve run in solver order; positions, normals and faces keep source order.
+//! Vertices carry three numbers: the source order (`vertex`) of positions, normals and faces; the order of decode and
+//! right-hand side (`lane`), in which what moves together stands together; and the elimination order of the factor
+//! (`solver`), in which the solve runs.
 
 use rkyv::{
     Archive, ArchiveUnsized, Place, Serialize, SerializeUnsized,
@@ -12,7 +13,7 @@ use rkyv::{
     with::{ArchiveWith, InlineAsBox, SerializeWith},
 };
 
-use super::FEATURE_COUNT;
+use super::{FAN_VERTICES, FEATURE_COUNT, GROUP_NODES};
 
 /// Nodes of a block, and rows and columns of a tile.
 pub const TILE_SIDE: usize = 4;
@@ -58,12 +59,12 @@ pub struct BakedBasis<'a> {
     /// Triangles in **source** order. Shape: `[F]`.
     #[rkyv(with = InlineAsBox)]
     pub faces: &'a [[u32; 3]],
-    /// Where a vertex stands in the exact tier. Shape: `[V]`, a permutation.
+    /// Lane of each vertex in the exact tier. Shape: `[V]`, a permutation.
     #[rkyv(with = InlineAsBox)]
-    pub solver_from_vertex: &'a [u32],
+    pub lane_from_vertex: &'a [u32],
     /// Shape: `[V]`, its inverse.
     #[rkyv(with = InlineAsBox)]
-    pub vertex_from_solver: &'a [u32],
+    pub vertex_from_lane: &'a [u32],
     /// Network value to log-rotation, radians. Positive.
     pub rotation_scale: f32,
     /// Network value to stretch. Positive.
@@ -74,6 +75,14 @@ pub struct BakedBasis<'a> {
     /// Components in block order. Shape: `[K]`.
     #[rkyv(with = InlineAsBox)]
     pub components: &'a [BakedComponent<'a>],
+    /// Compressed rows over `fans`, one for each [`FAN_VERTICES`] lanes of the exact tier, the last perhaps short.
+    /// Shape: `[ceil(V / FAN_VERTICES) + 1]`, starts at 0, never falls.
+    #[rkyv(with = InlineAsBox)]
+    pub fan_offsets: &'a [u32],
+    /// Lanes of the exact tier. Each vertex's own column walks around it: two in succession and the vertex are a triangle,
+    /// and the vertex itself parts fans and fills up.
+    #[rkyv(with = InlineAsBox)]
+    pub fans: &'a [[u32; FAN_VERTICES]],
     /// The tier whose nodes are the vertices: N = V.
     pub exact: BakedTier<'a>,
     /// A tier of fewer nodes, for crowds and small devices.
@@ -89,13 +98,11 @@ pub struct BakedFast<'a> {
     pub nodes: BakedTier<'a>,
     /// Middle of the rest shape: gradients act about it, so that a mesh far from the origin loses no digits.
     pub centre: [f32; 3],
-    /// Rest shape in **source** order, to the bit that of the exact tier. Shape: `[V]`.
-    #[rkyv(with = InlineAsBox)]
-    pub rest_positions: &'a [[f32; 3]],
-    /// The four nodes of each vertex, solver indices of the tier. Shape: `[V]`, source order.
+    /// The four nodes of each vertex, lanes of `nodes`. Shape: `[V]`, lanes of the exact tier.
     #[rkyv(with = InlineAsBox)]
     pub skin_nodes: &'a [[u16; SKIN_NODES]],
-    /// Their weights, in units of 1 / 65535; each row sums to 65535. Shape: `[V]`, source order.
+    /// Their weights, in units of 1 / 65535; each row sums to 65535. Shape: `[V]`, lanes of the exact
+    /// tier.
     #[rkyv(with = InlineAsBox)]
     pub skin_weights: &'a [[u16; SKIN_NODES]],
     /// How far the tier is from the exact one.
@@ -129,17 +136,18 @@ pub struct FastError {
     pub mixed_poses: u32,
 }
 
-/// What a frame reads from blend to solve, for a set of N nodes: all vertices, or a graph that stands for them. Solver
-/// indices number the nodes in the tier's own order of elimination.
+/// What a frame reads from decode to solve, for a set of N nodes: all vertices, or a graph that stands for them. Lanes number
+/// the nodes in the order of decoding, [`GROUP_NODES`] lanes a group, the last group perhaps short; solver indices in
+/// the tier's own order of elimination.
 #[derive(Archive, Serialize, Debug, Clone, Copy)]
 pub struct BakedTier<'a> {
-    /// Rest shape of the nodes, solver order. Shape: `[N]`.
+    /// Rest shape of the nodes. Shape: `[N]`, lanes.
     #[rkyv(with = InlineAsBox)]
     pub rest_positions: &'a [[f32; 3]],
-    /// One-rings (with bridges) in solver order, compressed rows. Shape: `[N + 1]`, starts at 0, never falls.
+    /// One-rings (with bridges) of the lanes, compressed rows. Shape: `[N + 1]`, starts at 0, never falls.
     #[rkyv(with = InlineAsBox)]
     pub ring_offsets: &'a [u32],
-    /// Solver indices, ascending within a row, never the row itself. Shape: `[2 * edges]`.
+    /// Lanes, ascending within a row, never the row itself. Shape: `[2 * edges]`.
     #[rkyv(with = InlineAsBox)]
     pub ring: &'a [u32],
     /// Half the cotangent sum of each edge, symmetric, non-negative in the exact tier. Shape: that of `ring`.
@@ -158,21 +166,22 @@ pub struct BakedTier<'a> {
     /// `1 / D`: symmetric, row-major, zero where the last block has no node. Shape: `[T]`. Starts as `tiles` does.
     #[rkyv(with = OnCacheLines)]
     pub inverse_diagonals: &'a [[f32; TILE_ENTRIES]],
-    /// Compressed rows over `support`, one a block. Shape: `[B + 1]`, starts at 0, never falls.
+    /// Solver index of each lane. Shape: `[N]`, a permutation.
     #[rkyv(with = InlineAsBox)]
-    pub support_offsets: &'a [u32],
-    /// Nodes (solver indices, ascending within a block) that any of a block's components moves.
+    pub solver_from_lane: &'a [u32],
+    /// Shape: `[N]`, its inverse.
     #[rkyv(with = InlineAsBox)]
-    pub support: &'a [u32],
-    /// Compressed rows over `entry_slots`, one a component. Shape: `[K + 1]`, starts at 0, never falls.
+    pub lane_from_solver: &'a [u32],
+    /// Compressed rows over the patches, one a group; G = ceil(N / GROUP_NODES). Shape: `[G + 1]`, starts at 0, never falls.
     #[rkyv(with = InlineAsBox)]
-    pub entry_offsets: &'a [u32],
-    /// For each entry of a component the place in its block's support, ascending within a component.
+    pub patch_offsets: &'a [u32],
+    /// Component of each patch, ascending within a group, and the block it belongs to. Shape: `[T]`.
     #[rkyv(with = InlineAsBox)]
-    pub entry_slots: &'a [u32],
-    /// Folded values `point C_k + neighbour mean C_k` as IEEE half bits, times the component's `value_scale`. Shape: that of `entry_slots`.
+    pub patch_owners: &'a [[u16; 2]],
+    /// Folded values `point C_k + neighbour mean C_k` as IEEE half bits, times the component's `value_scale`; zero where the
+    /// component does not reach, and beyond the last node. Shape: `[T]` of `[9][GROUP_NODES]`.
     #[rkyv(with = InlineAsBox)]
-    pub entry_values: &'a [[u16; FEATURE_COUNT]],
+    pub patch_values: &'a [[[u16; GROUP_NODES]; FEATURE_COUNT]],
 }
 
 /// One autoencoder block, folded: `x_v += tanh(bias + sum_k z_k C_k,v) - tanh(bias)` on its support.

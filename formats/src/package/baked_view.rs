@@ -3,8 +3,8 @@
 use rkyv::{api::low::access, rancor::Failure};
 
 use super::{
-    ArchivedBakedBasis, ArchivedBakedFast, ArchivedBakedTier, BakedBlock, BakedComponent, FEATURE_COUNT, FastError,
-    Header, OpenError, PackageKind, SKIN_NODES, TILE_ENTRIES, TILE_SIDE,
+    ArchivedBakedBasis, ArchivedBakedFast, ArchivedBakedTier, BakedBlock, BakedComponent, FAN_VERTICES, FEATURE_COUNT,
+    FastError, GROUP_NODES, Header, OpenError, PackageKind, SKIN_NODES, TILE_ENTRIES, TILE_SIDE,
     open::{native, payload},
     rules,
 };
@@ -57,7 +57,7 @@ impl<'a> BakedView<'a> {
 
     /// V, at least 3.
     pub fn vertex_count(&self) -> usize {
-        self.archived.solver_from_vertex.len()
+        self.archived.lane_from_vertex.len()
     }
 
     /// B, at least 1.
@@ -76,13 +76,13 @@ impl<'a> BakedView<'a> {
     }
 
     /// Shape: `[V]`, a permutation.
-    pub fn solver_from_vertex(&self) -> &'a [u32] {
-        native(&self.archived.solver_from_vertex)
+    pub fn lane_from_vertex(&self) -> &'a [u32] {
+        native(&self.archived.lane_from_vertex)
     }
 
     /// Shape: `[V]`, its inverse.
-    pub fn vertex_from_solver(&self) -> &'a [u32] {
-        native(&self.archived.vertex_from_solver)
+    pub fn vertex_from_lane(&self) -> &'a [u32] {
+        native(&self.archived.vertex_from_lane)
     }
 
     /// Network value to log-rotation, radians, positive.
@@ -131,6 +131,16 @@ impl<'a> BakedView<'a> {
         (0..view.component_count()).map(move |k| view.component(k))
     }
 
+    /// Shape: `[ceil(V / FAN_VERTICES) + 1]`, from 0 to `fans().len()`, never falls.
+    pub fn fan_offsets(&self) -> &'a [u32] {
+        native(&self.archived.fan_offsets)
+    }
+
+    /// Lanes of the exact tier, < V.
+    pub fn fans(&self) -> &'a [[u32; FAN_VERTICES]] {
+        native(&self.archived.fans)
+    }
+
     /// The tier whose nodes are the vertices.
     pub fn exact(&self) -> TierView<'a> {
         TierView {
@@ -145,7 +155,7 @@ impl<'a> BakedView<'a> {
 }
 
 impl<'a> FastView<'a> {
-    /// The nodes and all that blend, decode and solve read.
+    /// The nodes and all that decode and solve read.
     pub fn nodes(&self) -> TierView<'a> {
         TierView {
             archived: &self.archived.nodes,
@@ -157,17 +167,12 @@ impl<'a> FastView<'a> {
         bytemuck::cast(self.archived.centre)
     }
 
-    /// Source order, finite; those of the exact tier. Shape: `[V]`.
-    pub fn rest_positions(&self) -> &'a [[f32; 3]] {
-        native(&self.archived.rest_positions)
-    }
-
-    /// Solver indices of the tier, each < N. Shape: `[V]`, source order.
+    /// Lanes of the nodes, each < N. Shape: `[V]`, lanes of the exact tier.
     pub fn skin_nodes(&self) -> &'a [[u16; SKIN_NODES]] {
         native(&self.archived.skin_nodes)
     }
 
-    /// Each row sums to [`SKIN_WEIGHT_SUM`](super::SKIN_WEIGHT_SUM). Shape: `[V]`, source order.
+    /// Each row sums to [`SKIN_WEIGHT_SUM`](super::SKIN_WEIGHT_SUM). Shape: `[V]`, lanes of the exact tier.
     pub fn skin_weights(&self) -> &'a [[u16; SKIN_NODES]] {
         native(&self.archived.skin_weights)
     }
@@ -193,7 +198,7 @@ impl<'a> TierView<'a> {
         self.archived.rest_positions.len()
     }
 
-    /// Solver order, finite. Shape: `[N]`.
+    /// Lanes, finite. Shape: `[N]`.
     pub fn rest_positions(&self) -> &'a [[f32; 3]] {
         native(&self.archived.rest_positions)
     }
@@ -203,7 +208,7 @@ impl<'a> TierView<'a> {
         native(&self.archived.ring_offsets)
     }
 
-    /// Solver indices < N, ascending within a row, never the row itself.
+    /// Lanes < N, ascending within a row, never the row itself.
     pub fn ring(&self) -> &'a [u32] {
         native(&self.archived.ring)
     }
@@ -238,47 +243,58 @@ impl<'a> TierView<'a> {
         native(&self.archived.inverse_diagonals)
     }
 
-    /// Shape: `[B + 1]`, from 0 to `support().len()`, never falls.
-    pub fn support_offsets(&self) -> &'a [u32] {
-        native(&self.archived.support_offsets)
+    /// Shape: `[N]`, a permutation.
+    pub fn solver_from_lane(&self) -> &'a [u32] {
+        native(&self.archived.solver_from_lane)
     }
 
-    /// Solver indices < N, ascending within a block.
-    pub fn support(&self) -> &'a [u32] {
-        native(&self.archived.support)
+    /// Shape: `[N]`, its inverse.
+    pub fn lane_from_solver(&self) -> &'a [u32] {
+        native(&self.archived.lane_from_solver)
     }
 
-    /// Nodes that block `b` < B moves. Panics past the end, like a slice.
-    pub fn support_of(&self, b: usize) -> &'a [u32] {
-        row(self.support(), self.support_offsets(), b)
+    /// Shape: `[ceil(N / GROUP_NODES) + 1]`, from 0 to `patch_owners().len()`, never falls.
+    pub fn patch_offsets(&self) -> &'a [u32] {
+        native(&self.archived.patch_offsets)
     }
 
-    /// Shape: `[K + 1]`, from 0 to `entry_slots().len()`, never falls.
-    pub fn entry_offsets(&self) -> &'a [u32] {
-        native(&self.archived.entry_offsets)
+    /// Component < K and its block, ascending within a group. Shape: `[T]`.
+    pub fn patch_owners(&self) -> &'a [[u16; 2]] {
+        native(&self.archived.patch_owners)
     }
 
-    /// Places in the block's support, ascending within a component.
-    pub fn entry_slots(&self) -> &'a [u32] {
-        native(&self.archived.entry_slots)
+    /// Half bits, finite. Shape: `[T]`.
+    pub fn patch_values(&self) -> &'a [[[u16; GROUP_NODES]; FEATURE_COUNT]] {
+        native(&self.archived.patch_values)
     }
 
-    /// Half bits, finite. Shape: that of `entry_slots`.
-    pub fn entry_values(&self) -> &'a [[u16; FEATURE_COUNT]] {
-        native(&self.archived.entry_values)
-    }
-
-    /// Slots and values of component `k` < K. Panics past the end, like a slice.
-    pub fn entries_of(&self, k: usize) -> (&'a [u32], &'a [[u16; FEATURE_COUNT]]) {
-        let offsets = self.entry_offsets();
-        (
-            row(self.entry_slots(), offsets, k),
-            row(self.entry_values(), offsets, k),
-        )
+    /// What the patches hold that is not zero, group by group.
+    pub fn entries(&self) -> impl Iterator<Item = TierEntry> + use<'a> {
+        /// Without the sign: both zeros are zero.
+        const MAGNITUDE: u16 = 0x7fff;
+        let tier = *self;
+        let patches = tier.patch_offsets().windows(2).enumerate();
+        let patches = patches.flat_map(|(g, row)| (row[0] as usize..row[1] as usize).map(move |p| (g, p)));
+        let lanes = patches.flat_map(|(g, p)| (0..GROUP_NODES).map(move |n| (g * GROUP_NODES + n, p, n)));
+        lanes.filter_map(move |(lane, p, n)| {
+            let values = tier.patch_values()[p].map(|row| row[n]);
+            let moves = lane < tier.node_count() && values.iter().any(|half| half & MAGNITUDE != 0);
+            moves.then_some(TierEntry {
+                component: usize::from(tier.patch_owners()[p][0]),
+                lane,
+                values,
+            })
+        })
     }
 }
 
-/// Row `i` of compressed rows.
-fn row<'a, T>(entries: &'a [T], offsets: &[u32], i: usize) -> &'a [T] {
-    &entries[offsets[i] as usize..offsets[i + 1] as usize]
+/// Where one component moves one node of a tier.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TierEntry {
+    /// k < K.
+    pub component: usize,
+    /// < N.
+    pub lane: usize,
+    /// Half bits; times the component's `value_scale`.
+    pub values: [u16; FEATURE_COUNT],
 }

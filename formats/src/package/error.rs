@@ -175,15 +175,10 @@ pub enum OpenError {
         /// Element.
         index: usize,
     },
-    /// The fast tier has another rest position than the exact one.
-    RestDiffers {
-        /// Vertex, source order.
-        vertex: usize,
-    },
     /// The weights of a vertex in the fast tier do not sum to one.
     SkinWeightSum {
-        /// Vertex, source order.
-        vertex: usize,
+        /// Lane of the exact tier.
+        lane: usize,
         /// Their sum, in units of 1 / 65535.
         sum: u32,
     },
@@ -326,11 +321,8 @@ impl fmt::Display for OpenError {
                     "`{field}` {index} differs from the same edge in the other direction"
                 )
             }
-            Self::RestDiffers { vertex } => {
-                write!(out, "the tiers disagree about the rest position of vertex {vertex}")
-            }
-            Self::SkinWeightSum { vertex, sum } => {
-                write!(out, "the skin weights of vertex {vertex} sum to {sum} and not to 65535")
+            Self::SkinWeightSum { lane, sum } => {
+                write!(out, "the skin weights of lane {lane} sum to {sum} and not to 65535")
             }
             Self::BitmapTail { component } => {
                 write!(

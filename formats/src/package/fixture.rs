@@ -10,16 +10,16 @@ use half::f16;
 
 use super::{
     BakedBasis, BakedBlock, BakedComponent, BakedFast, BakedTier, BlockRecord, CompactBasis, ComponentRecord,
-    FEATURE_COUNT, FastError, GraphConvRecord, Header, NONE, PackageKind, Provenance, Quality, SKIN_NODES,
-    TILE_ENTRIES, TILE_SIDE, write_compact,
+    FAN_VERTICES, FEATURE_COUNT, Fans, FastError, GraphConvRecord, Header, NONE, PackageKind, Patch, Patches,
+    Provenance, Quality, SKIN_NODES, TILE_ENTRIES, TILE_SIDE, write_compact,
 };
 
 /// V of the grid.
 pub const VERTEX_COUNT: usize = 9;
 /// K: two coarse components, one fine component on each.
 pub const COMPONENT_COUNT: usize = 4;
-/// Elimination order: the middle of the grid last.
-pub const VERTEX_FROM_SOLVER: [u32; VERTEX_COUNT] = [0, 2, 6, 8, 1, 3, 5, 7, 4];
+/// Order of decoding: the elimination order backwards, which takes the middle of the grid last.
+pub const VERTEX_FROM_LANE: [u32; VERTEX_COUNT] = [4, 7, 5, 3, 1, 8, 6, 2, 0];
 /// The vertex that the solve holds.
 pub const ANCHOR_VERTEX: u32 = 0;
 
@@ -47,12 +47,14 @@ pub struct TinyCompact {
 pub struct TinyBaked {
     pub compact_id: [u8; 16],
     pub faces: Vec<[u32; 3]>,
-    pub solver_from_vertex: Vec<u32>,
-    pub vertex_from_solver: Vec<u32>,
+    pub lane_from_vertex: Vec<u32>,
+    pub vertex_from_lane: Vec<u32>,
     pub rotation_scale: f32,
     pub stretch_scale: f32,
     pub blocks: Vec<BakedBlock>,
     pub components: Vec<BakedComponent<'static>>,
+    pub fan_offsets: Vec<u32>,
+    pub fans: Vec<[u32; FAN_VERTICES]>,
     pub exact: TinyTier,
     pub fast: Option<TinyFast>,
 }
@@ -63,7 +65,6 @@ pub struct TinyBaked {
 pub struct TinyFast {
     pub nodes: TinyTier,
     pub centre: [f32; 3],
-    pub rest_positions: Vec<[f32; 3]>,
     pub skin_nodes: Vec<[u16; SKIN_NODES]>,
     pub skin_weights: Vec<[u16; SKIN_NODES]>,
     pub error: FastError,
@@ -81,11 +82,11 @@ pub struct TinyTier {
     pub tile_rows: Vec<u32>,
     pub tiles: Vec<[f32; TILE_ENTRIES]>,
     pub inverse_diagonals: Vec<[f32; TILE_ENTRIES]>,
-    pub support_offsets: Vec<u32>,
-    pub support: Vec<u32>,
-    pub entry_offsets: Vec<u32>,
-    pub entry_slots: Vec<u32>,
-    pub entry_values: Vec<[u16; FEATURE_COUNT]>,
+    pub solver_from_lane: Vec<u32>,
+    pub lane_from_solver: Vec<u32>,
+    pub patch_offsets: Vec<u32>,
+    pub patch_owners: Vec<[u16; 2]>,
+    pub patch_values: Vec<Patch>,
 }
 
 impl TinyCompact {
@@ -114,12 +115,14 @@ impl TinyBaked {
         BakedBasis {
             compact_id: self.compact_id,
             faces: &self.faces,
-            solver_from_vertex: &self.solver_from_vertex,
-            vertex_from_solver: &self.vertex_from_solver,
+            lane_from_vertex: &self.lane_from_vertex,
+            vertex_from_lane: &self.vertex_from_lane,
             rotation_scale: self.rotation_scale,
             stretch_scale: self.stretch_scale,
             blocks: &self.blocks,
             components: &self.components,
+            fan_offsets: &self.fan_offsets,
+            fans: &self.fans,
             exact: self.exact.tier(),
             fast: self.fast.as_ref().map(TinyFast::fast),
         }
@@ -127,16 +130,11 @@ impl TinyBaked {
 
     /// A fast tier that is the exact one over again: every vertex is a node and follows itself, so both play the same.
     pub fn own_nodes(&self) -> TinyFast {
-        let vertices = self.solver_from_vertex.iter();
         TinyFast {
             nodes: self.exact.clone(),
             centre: [0.25, 0.5, 0.0],
-            rest_positions: vertices
-                .clone()
-                .map(|&solver| self.exact.rest_positions[solver as usize])
-                .collect(),
-            skin_nodes: vertices.map(|&solver| [solver as u16; SKIN_NODES]).collect(),
-            skin_weights: alloc::vec![[16_384, 16_384, 16_384, 16_383]; self.solver_from_vertex.len()],
+            skin_nodes: (0..VERTEX_COUNT as u16).map(|lane| [lane; SKIN_NODES]).collect(),
+            skin_weights: alloc::vec![[16_384, 16_384, 16_384, 16_383]; VERTEX_COUNT],
             error: FastError {
                 mixed_rms: 1e-6,
                 mixed_p99: 2e-6,
@@ -155,7 +153,6 @@ impl TinyFast {
         BakedFast {
             nodes: self.nodes.tier(),
             centre: self.centre,
-            rest_positions: &self.rest_positions,
             skin_nodes: &self.skin_nodes,
             skin_weights: &self.skin_weights,
             error: self.error,
@@ -174,11 +171,11 @@ impl TinyTier {
             tile_rows: &self.tile_rows,
             tiles: &self.tiles,
             inverse_diagonals: &self.inverse_diagonals,
-            support_offsets: &self.support_offsets,
-            support: &self.support,
-            entry_offsets: &self.entry_offsets,
-            entry_slots: &self.entry_slots,
-            entry_values: &self.entry_values,
+            solver_from_lane: &self.solver_from_lane,
+            lane_from_solver: &self.lane_from_solver,
+            patch_offsets: &self.patch_offsets,
+            patch_owners: &self.patch_owners,
+            patch_values: &self.patch_values,
         }
     }
 }
@@ -253,34 +250,39 @@ pub fn tiny_compact() -> TinyCompact {
 pub fn tiny_baked() -> TinyBaked {
     let compact = tiny_compact();
     let weights = edge_weights();
-    let solver_from_vertex: Vec<u32> = (0..VERTEX_COUNT as u32)
-        .map(|vertex| VERTEX_FROM_SOLVER.iter().position(|&v| v == vertex).unwrap_or_default() as u32)
+    let lane_from_vertex: Vec<u32> = (0..VERTEX_COUNT as u32)
+        .map(|vertex| VERTEX_FROM_LANE.iter().position(|&v| v == vertex).unwrap_or_default() as u32)
         .collect();
     let mut exact = TinyTier {
-        rest_positions: VERTEX_FROM_SOLVER.map(|v| compact.rest_positions[v as usize]).to_vec(),
+        rest_positions: VERTEX_FROM_LANE.map(|v| compact.rest_positions[v as usize]).to_vec(),
         ring_offsets: alloc::vec![0],
+        solver_from_lane: (0..VERTEX_COUNT as u32).rev().collect(),
+        lane_from_solver: (0..VERTEX_COUNT as u32).rev().collect(),
         ..TinyTier::default()
     };
     for row in 0..VERTEX_COUNT {
         for column in 0..VERTEX_COUNT {
-            if let Some(weight) = weights[VERTEX_FROM_SOLVER[row] as usize][VERTEX_FROM_SOLVER[column] as usize] {
+            if let Some(weight) = weights[VERTEX_FROM_LANE[row] as usize][VERTEX_FROM_LANE[column] as usize] {
                 exact.ring.push(column as u32);
                 exact.ring_weights.push(weight);
             }
         }
         exact.ring_offsets.push(exact.ring.len() as u32);
     }
-    factorize(&mut exact, solver_from_vertex[ANCHOR_VERTEX as usize] as usize);
+    factorize(&mut exact, lane_from_vertex[ANCHOR_VERTEX as usize] as usize);
     fold(&compact, &mut exact);
+    let fans = Fans::gather(&compact.faces, &lane_from_vertex);
     TinyBaked {
         compact_id: compact_id(&compact),
         faces: compact.faces.clone(),
-        solver_from_vertex,
-        vertex_from_solver: VERTEX_FROM_SOLVER.to_vec(),
+        lane_from_vertex,
+        vertex_from_lane: VERTEX_FROM_LANE.to_vec(),
         rotation_scale: compact.rotation_scale,
         stretch_scale: compact.stretch_scale,
         blocks: compact.blocks.iter().map(baked_block).collect(),
         components: compact.components.iter().map(baked_component).collect(),
+        fan_offsets: fans.fan_offsets,
+        fans: fans.fans,
         exact,
         fast: None,
     }
@@ -306,19 +308,21 @@ fn baked_component(component: &ComponentRecord<'static>) -> BakedComponent<'stat
     }
 }
 
-/// The Laplacian, with 1 added at the anchor (solver index), to `F D F^T` by blocks, dense.
+/// The Laplacian, with 1 added at the anchor (a lane), to `F D F^T` by blocks, dense.
 fn factorize(tier: &mut TinyTier, anchor: usize) {
     const BLOCK_COUNT: usize = VERTEX_COUNT.div_ceil(TILE_SIDE);
     // Where the last block has no node it has a node of its own, so that it can be inverted.
     let mut lower = [[0.0_f64; BLOCK_COUNT * TILE_SIDE]; BLOCK_COUNT * TILE_SIDE];
-    for row in 0..VERTEX_COUNT {
-        for entry in tier.ring_offsets[row] as usize..tier.ring_offsets[row + 1] as usize {
+    let solver = |lane: usize| tier.solver_from_lane[lane] as usize;
+    for lane in 0..VERTEX_COUNT {
+        let row = solver(lane);
+        for entry in tier.ring_offsets[lane] as usize..tier.ring_offsets[lane + 1] as usize {
             let weight = f64::from(tier.ring_weights[entry]);
             lower[row][row] += weight;
-            lower[row][tier.ring[entry] as usize] -= weight;
+            lower[row][solver(tier.ring[entry] as usize)] -= weight;
         }
     }
-    lower[anchor][anchor] += 1.0;
+    lower[solver(anchor)][solver(anchor)] += 1.0;
     for (row, entries) in lower.iter_mut().enumerate().skip(VERTEX_COUNT) {
         entries[row] = 1.0;
     }
@@ -377,26 +381,20 @@ fn inverse(mut matrix: [[f64; TILE_SIDE]; TILE_SIDE]) -> [[f64; TILE_SIDE]; TILE
 /// Multiplies the components by the decoders: `point C_k + neighbour mean C_k`, on supports grown by a ring.
 fn fold(compact: &TinyCompact, tier: &mut TinyTier) {
     let dense = dense_components(compact);
-    tier.support_offsets.push(0);
-    tier.entry_offsets.push(0);
-    for block in &compact.blocks {
-        let own = block.first_component as usize..(block.first_component + block.component_count) as usize;
-        let folded: Vec<Vec<[f32; FEATURE_COUNT]>> = own.map(|k| convolve(&block.decoder, &dense[k], tier)).collect();
-        let moves = |solver: usize| folded.iter().any(|component| component[solver] != [0.0; FEATURE_COUNT]);
-        let support: Vec<usize> = (0..VERTEX_COUNT).filter(|&solver| moves(solver)).collect();
-        for component in &folded {
-            for (slot, &solver) in support.iter().enumerate() {
-                if component[solver] != [0.0; FEATURE_COUNT] {
-                    tier.entry_slots.push(slot as u32);
-                    tier.entry_values
-                        .push(component[solver].map(|value| f16::from_f32(value).to_bits()));
-                }
+    let mut entries = Vec::new();
+    for (k, component) in compact.components.iter().enumerate() {
+        let decoder = &compact.blocks[component.block as usize].decoder;
+        for (lane, values) in convolve(decoder, &dense[k], tier).into_iter().enumerate() {
+            if values != [0.0; FEATURE_COUNT] {
+                let halves = values.map(|value| f16::from_f32(value).to_bits());
+                entries.push((k, component.block, lane as u32, halves));
             }
-            tier.entry_offsets.push(tier.entry_slots.len() as u32);
         }
-        tier.support.extend(support.iter().map(|&solver| solver as u32));
-        tier.support_offsets.push(tier.support.len() as u32);
     }
+    let patches = Patches::gather(VERTEX_COUNT, entries);
+    tier.patch_offsets = patches.patch_offsets;
+    tier.patch_owners = patches.patch_owners;
+    tier.patch_values = patches.patch_values;
 }
 
 /// Components without their value scales. Shape: `[K][V]`, source order.
@@ -413,23 +411,22 @@ fn dense_components(compact: &TinyCompact) -> Vec<[[f32; FEATURE_COUNT]; VERTEX_
     dense.collect()
 }
 
-/// One component through a convolution without its bias; in source order, out solver order.
+/// One component through a convolution without its bias; in source order, out in lanes.
 fn convolve(
     conv: &GraphConvRecord,
     component: &[[f32; FEATURE_COUNT]; VERTEX_COUNT],
     tier: &TinyTier,
 ) -> Vec<[f32; FEATURE_COUNT]> {
-    let in_solver_order = |solver: u32| component[VERTEX_FROM_SOLVER[solver as usize] as usize];
+    let in_lanes = |lane: u32| component[VERTEX_FROM_LANE[lane as usize] as usize];
     let product = |matrix: &[[f32; FEATURE_COUNT]; FEATURE_COUNT], input: [f32; FEATURE_COUNT]| {
         matrix.map(|row| row.iter().zip(input).map(|(a, x)| a * x).sum::<f32>())
     };
-    let convolved = (0..VERTEX_COUNT).map(|solver| {
-        let ring = &tier.ring[tier.ring_offsets[solver] as usize..tier.ring_offsets[solver + 1] as usize];
-        let mean: [f32; FEATURE_COUNT] = core::array::from_fn(|i| {
-            ring.iter().map(|&other| in_solver_order(other)[i]).sum::<f32>() / ring.len() as f32
-        });
+    let convolved = (0..VERTEX_COUNT).map(|lane| {
+        let ring = &tier.ring[tier.ring_offsets[lane] as usize..tier.ring_offsets[lane + 1] as usize];
+        let mean: [f32; FEATURE_COUNT] =
+            core::array::from_fn(|i| ring.iter().map(|&other| in_lanes(other)[i]).sum::<f32>() / ring.len() as f32);
         let (point, neighbour) = (
-            product(&conv.point, in_solver_order(solver as u32)),
+            product(&conv.point, in_lanes(lane as u32)),
             product(&conv.neighbour, mean),
         );
         core::array::from_fn(|i| point[i] + neighbour[i])

@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use super::fixture::{TinyTier, tiny_baked, tiny_compact};
+use super::fixture::{TinyTier, VERTEX_COUNT, tiny_baked, tiny_compact};
 use super::*;
 
 #[test]
@@ -34,12 +34,14 @@ fn a_baked_package_is_read_as_written() {
     let view = BakedView::open(&bytes).unwrap();
     assert_eq!(view.compact_id(), tiny.compact_id);
     assert_eq!(view.faces(), tiny.faces);
-    assert_eq!(view.solver_from_vertex(), tiny.solver_from_vertex);
-    assert_eq!(view.vertex_from_solver(), tiny.vertex_from_solver);
+    assert_eq!(view.lane_from_vertex(), tiny.lane_from_vertex);
+    assert_eq!(view.vertex_from_lane(), tiny.vertex_from_lane);
     assert_eq!(view.rotation_scale(), tiny.rotation_scale);
     assert_eq!(view.stretch_scale(), tiny.stretch_scale);
     assert_eq!(view.blocks().collect::<Vec<_>>(), tiny.blocks);
     assert_eq!(view.components().collect::<Vec<_>>(), tiny.components);
+    assert_eq!(view.fan_offsets(), tiny.fan_offsets);
+    assert_eq!(view.fans(), tiny.fans);
     tier_is_read_as_written(&view.exact(), &tiny.exact);
     assert!(view.fast().is_none());
 }
@@ -54,11 +56,29 @@ fn tier_is_read_as_written(view: &TierView<'_>, tiny: &TinyTier) {
     assert_eq!(view.tile_rows(), tiny.tile_rows);
     assert_eq!(view.tiles(), tiny.tiles);
     assert_eq!(view.inverse_diagonals(), tiny.inverse_diagonals);
-    assert_eq!(view.support_offsets(), tiny.support_offsets);
-    assert_eq!(view.support(), tiny.support);
-    assert_eq!(view.entry_offsets(), tiny.entry_offsets);
-    assert_eq!(view.entry_slots(), tiny.entry_slots);
-    assert_eq!(view.entry_values(), tiny.entry_values);
+    assert_eq!(view.solver_from_lane(), tiny.solver_from_lane);
+    assert_eq!(view.lane_from_solver(), tiny.lane_from_solver);
+    assert_eq!(view.patch_offsets(), tiny.patch_offsets);
+    assert_eq!(view.patch_owners(), tiny.patch_owners);
+    assert_eq!(view.patch_values(), tiny.patch_values);
+}
+
+#[test]
+fn entries_are_what_the_patches_hold() {
+    let tiny = tiny_baked();
+    let bytes = write_baked(&tiny.basis()).unwrap();
+    let entries: Vec<_> = BakedView::open(&bytes).unwrap().exact().entries().collect();
+    let held = tiny.exact.patch_values.iter().zip(&tiny.exact.patch_owners);
+    for (values, owner) in held {
+        for lane in 0..VERTEX_COUNT {
+            let own = entries
+                .iter()
+                .find(|entry| entry.lane == lane && entry.component == usize::from(owner[0]));
+            let stored = values.map(|row| row[lane]);
+            assert_eq!(own.map_or([0; FEATURE_COUNT], |entry| entry.values), stored);
+        }
+    }
+    assert!(entries.len() > 10);
 }
 
 #[test]
@@ -88,7 +108,6 @@ fn a_second_tier_is_read_as_written() {
     let read = view.fast().unwrap();
     tier_is_read_as_written(&read.nodes(), &fast.nodes);
     assert_eq!(read.centre(), fast.centre);
-    assert_eq!(read.rest_positions(), fast.rest_positions);
     assert_eq!(read.skin_nodes(), fast.skin_nodes);
     assert_eq!(read.skin_weights(), fast.skin_weights);
     assert_eq!(read.error(), fast.error);
@@ -208,20 +227,22 @@ fn records_lie_as_documented() {
     let baked = places!(Baked {
         compact_id,
         faces,
-        solver_from_vertex,
-        vertex_from_solver,
+        lane_from_vertex,
+        vertex_from_lane,
         rotation_scale,
         stretch_scale,
         blocks,
         components,
+        fan_offsets,
+        fans,
         exact,
         fast,
     });
-    assert_eq!(baked, [0, 16, 24, 32, 40, 44, 48, 56, 64, 168]);
-    assert_eq!((size_of::<Baked>(), align_of::<Baked>()), (340, 4));
-    let fast = places!(ArchivedBakedFast<'static> { nodes, centre, rest_positions, skin_nodes, skin_weights, error });
-    assert_eq!(fast, [0, 104, 116, 124, 132, 140]);
-    assert_eq!(size_of::<ArchivedBakedFast<'static>>(), 168);
+    assert_eq!(baked, [0, 16, 24, 32, 40, 44, 48, 56, 64, 72, 80, 184]);
+    assert_eq!((size_of::<Baked>(), align_of::<Baked>()), (348, 4));
+    let fast = places!(ArchivedBakedFast<'static> { nodes, centre, skin_nodes, skin_weights, error });
+    assert_eq!(fast, [0, 104, 116, 124, 132]);
+    assert_eq!(size_of::<ArchivedBakedFast<'static>>(), 160);
     let error = places!(ArchivedFastError {
         mixed_rms,
         mixed_p99,
@@ -242,11 +263,11 @@ fn records_lie_as_documented() {
         tile_rows,
         tiles,
         inverse_diagonals,
-        support_offsets,
-        support,
-        entry_offsets,
-        entry_slots,
-        entry_values,
+        solver_from_lane,
+        lane_from_solver,
+        patch_offsets,
+        patch_owners,
+        patch_values,
     });
     assert_eq!(tier, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96]);
     assert_eq!((size_of::<Tier>(), align_of::<Tier>()), (104, 4));

@@ -7,12 +7,53 @@
 pub(crate) mod avx2;
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod avx512;
+pub(crate) mod decode;
+mod functions;
+pub(crate) mod lanes;
 pub(crate) mod scalar;
 
 #[cfg(test)]
 mod poisson_tests;
 #[cfg(test)]
 mod skin_tests;
+
+use decode::{BlockRest, Decoder, FeatureScales, Group};
+use lanes::{Gradient, One};
+use scalar::surface::{self, Around};
+
+/// A kernel of decode, by the set that it belongs to.
+macro_rules! dispatch {
+    ($name:ident ( $($argument:ident : $type:ty),* )) => {
+        #[doc = concat!("See [`decode::", stringify!($name), "`].")]
+        pub(crate) fn $name(self, $($argument: $type),*) {
+            match self {
+                #[cfg(target_arch = "x86_64")]
+                Self::Avx512 => avx512::$name($($argument),*),
+                #[cfg(target_arch = "x86_64")]
+                Self::Avx2 => avx2::$name($($argument),*),
+                _ => decode::$name::<One>($($argument),*),
+            }
+        }
+    };
+}
+
+impl Kernels {
+    /// See [`surface::normals`].
+    pub(crate) fn normals(self, around: &Around<'_>, posed: &[[f32; 4]], normals: &mut [[f32; 3]]) {
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            // A vertex has four numbers: sixteen lanes were slower than eight.
+            Self::Avx512 | Self::Avx2 => avx2::normals(around, posed, normals),
+            _ => surface::normals(around, posed, normals),
+        }
+    }
+
+    dispatch!(rest_activations(blocks: &mut [BlockRest]));
+    dispatch!(decode(decoder: &Decoder<'_>, gradients: &mut [Gradient]));
+    dispatch!(features(decoder: &Decoder<'_>, g: usize, features: &mut Group<f32>));
+    dispatch!(gradients(scales: FeatureScales, features: &Group<f32>, gradients: &mut [Gradient]));
+    dispatch!(tangents(decoder: &Decoder<'_>, k: usize, scale: f32, gradients: &mut [Gradient]));
+}
 
 /// A set of kernels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -80,3 +121,6 @@ impl Kernels {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

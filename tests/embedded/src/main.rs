@@ -9,7 +9,8 @@
 use core::ffi::{c_char, c_int};
 use core::panic::PanicInfo;
 
-use sinew_runtime::{Basis, Controls, Frame, Workspace};
+use sinew_checksum::{Checksum, play};
+use sinew_runtime::{Basis, Controls, Kernels, Workspace};
 
 // Only what puts a line on the screen and ends the program; nothing here knows the heap.
 #[link(name = "c")]
@@ -44,8 +45,8 @@ enum Failure {
 /// Linux starts here.
 #[unsafe(no_mangle)]
 extern "C" fn main(_argument_count: c_int, _arguments: *const *const c_char) -> c_int {
-    match play() {
-        Ok(checksum) => {
+    match play_package() {
+        Ok(Checksum(checksum)) => {
             let mut line = [0_u8; 17];
             for (n, digit) in line[..16].iter_mut().enumerate() {
                 *digit = b"0123456789abcdef"[(checksum >> (60 - 4 * n)) as usize & 15];
@@ -58,8 +59,8 @@ extern "C" fn main(_argument_count: c_int, _arguments: *const *const c_char) -> 
     }
 }
 
-/// Every component at half its range in turn; one checksum over all positions and normals.
-fn play() -> Result<u64, Failure> {
+/// The fixed poses, in memory on the stack.
+fn play_package() -> Result<Checksum, Failure> {
     let basis = Basis::open(&PACKAGE.0).map_err(|_| Failure::Open)?;
     let (vertex_count, component_count) = (basis.vertex_count(), basis.component_count());
     let (mut positions, mut normals) = ([[0.0; 3]; VERTEX_LIMIT], [[0.0; 3]; VERTEX_LIMIT]);
@@ -68,32 +69,10 @@ fn play() -> Result<u64, Failure> {
         return Err(Failure::TooLarge);
     }
     let mut memory = [0_u8; WORKSPACE_BYTES];
-    let mut workspace = Workspace::new(&basis, &mut memory).map_err(|_| Failure::Workspace)?;
+    let mut workspace = Workspace::with_kernels(&basis, &mut memory, Kernels::Scalar).map_err(|_| Failure::Workspace)?;
     let mut controls = Controls::new(&basis, &mut weights[..component_count]).map_err(|_| Failure::Controls)?;
-    let mut checksum = 0xcbf2_9ce4_8422_2325;
-    for k in 0..component_count {
-        controls
-            .set(k, 0.5 * basis.component(k).maximum)
-            .map_err(|_| Failure::Controls)?;
-        let (positions, normals) = (&mut positions[..vertex_count], &mut normals[..vertex_count]);
-        let frame = Frame {
-            basis: &basis,
-            controls: &controls,
-            positions,
-            normals: Some(normals),
-        };
-        frame.run(&mut workspace).map_err(|_| Failure::Frame)?;
-        checksum = mix(mix(checksum, positions), normals);
-    }
-    Ok(checksum)
-}
-
-/// FNV-1a over the bits.
-fn mix(checksum: u64, points: &[[f32; 3]]) -> u64 {
-    let bytes = points.as_flattened().iter().flat_map(|x| x.to_bits().to_le_bytes());
-    bytes.fold(checksum, |sum, byte| {
-        (sum ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3)
-    })
+    let (positions, normals) = (&mut positions[..vertex_count], &mut normals[..vertex_count]);
+    play(&mut controls, &mut workspace, positions, normals).map_err(|_| Failure::Frame)
 }
 
 #[panic_handler]

@@ -7,13 +7,14 @@
 pub mod factor;
 pub mod fast;
 pub mod fold;
+pub mod groups;
 pub mod mesh;
 pub mod sparse;
 mod surface;
 pub mod tier;
 
 use sinew_formats::package::{
-    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, CompactView, OpenError, WriteError, write_baked,
+    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, CompactView, Fans, OpenError, WriteError, write_baked,
 };
 
 use factor::EliminationOrder;
@@ -122,8 +123,15 @@ pub fn bake_with(package: &CompactView<'_>, options: &BakeOptions) -> Result<Ali
     let laplacian = surface.laplacian(anchor_vertex);
     let order = EliminationOrder::new(&laplacian)?;
     let folded = fold_package(package, &surface, &order);
-    let component_counts: Vec<usize> = package.blocks().map(|block| block.component_count as usize).collect();
-    let exact = Tier::new(&laplacian, order, package.rest_positions(), &folded, &component_counts)?;
+    let block_of_component: Vec<u32> = package.components().map(|component| component.block).collect();
+    let exact = Tier::new(
+        &laplacian,
+        order,
+        package.rest_positions(),
+        &folded,
+        &block_of_component,
+    )?;
+    let fans = Fans::gather(package.faces(), &exact.lane_from_node);
     let blocks: Vec<BakedBlock> = package
         .blocks()
         .map(|block| BakedBlock {
@@ -165,12 +173,14 @@ pub fn bake_with(package: &CompactView<'_>, options: &BakeOptions) -> Result<Ali
     write_baked(&BakedBasis {
         compact_id: package.content_id(),
         faces: package.faces(),
-        solver_from_vertex: &exact.solver_from_node,
-        vertex_from_solver: &exact.node_from_solver,
+        lane_from_vertex: &exact.lane_from_node,
+        vertex_from_lane: &exact.node_from_lane,
         rotation_scale: package.rotation_scale(),
         stretch_scale: package.stretch_scale(),
         blocks: &blocks,
         components: &components,
+        fan_offsets: &fans.fan_offsets,
+        fans: &fans.fans,
         exact: exact.record(),
         fast: fast.as_ref().map(Fast::record),
     })

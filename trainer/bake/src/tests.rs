@@ -47,11 +47,12 @@ fn factor_inverts_the_laplacian() {
     let surface = Surface::of_package(&compact);
     let laplacian = surface.laplacian(compact.anchor_vertex() as usize);
     let diagonal = laplacian.diagonal();
+    let vertex_of = |s: usize| baked.vertex_from_lane()[baked.exact().lane_from_solver()[s] as usize] as usize;
     for j in 0..vertex_count {
-        let w = baked.vertex_from_solver()[j] as usize;
+        let w = vertex_of(j);
         let mut x = vec![0.0; padded];
         for i in 0..vertex_count {
-            let v = baked.vertex_from_solver()[i] as usize;
+            let v = vertex_of(i);
             x[i] = match surface.topology.entry(v, w as u32) {
                 Some(entry) => -surface.weights.weights[entry],
                 None if v == w => diagonal[v],
@@ -74,14 +75,14 @@ fn identity_convolution_changes_no_value() {
     let baked = BakedView::open(&baked).unwrap();
     let components = sparse::unpack_components(&compact);
     for (k, (component, stored)) in baked.components().zip(&components).enumerate() {
-        let support = baked.exact().support_of(component.block as usize);
-        let (slots, values) = baked.exact().entries_of(k);
-        assert_eq!(slots.len(), stored.vertices.len(), "component {k} keeps its support");
-        for (&slot, bits) in slots.iter().zip(values) {
-            let vertex = baked.vertex_from_solver()[support[slot as usize] as usize];
+        let own: Vec<_> = baked.exact().entries().filter(|entry| entry.component == k).collect();
+        assert_eq!(own.len(), stored.vertices.len(), "component {k} keeps its support");
+        for entry in own {
+            let vertex = baked.vertex_from_lane()[entry.lane];
             let place = stored.vertices.binary_search(&vertex).unwrap();
-            let value: [f32; FEATURE_COUNT] =
-                bits.map(|bits| half::f16::from_bits(bits).to_f32() * component.value_scale);
+            let value: [f32; FEATURE_COUNT] = entry
+                .values
+                .map(|bits| half::f16::from_bits(bits).to_f32() * component.value_scale);
             assert_eq!(value, stored.values[place], "component {k}, vertex {vertex}");
         }
     }

@@ -213,12 +213,12 @@ fn fast_json(fast: &FastView<'_>) -> serde_json::Value {
 
 fn print_baked(out: &mut String, view: &BakedView<'_>, byte_count: usize, as_json: bool) {
     let exact = view.exact();
+    let mut vertex_counts = vec![0_usize; view.component_count()];
+    exact.entries().for_each(|entry| vertex_counts[entry.component] += 1);
     let components: Vec<_> = view
         .components()
         .enumerate()
-        .map(|(k, c)| {
-            json!({ "name": c.name, "range": [c.minimum, c.maximum], "vertices": exact.entries_of(k).0.len() })
-        })
+        .map(|(k, c)| json!({ "name": c.name, "range": [c.minimum, c.maximum], "vertices": vertex_counts[k] }))
         .collect();
     if as_json {
         let summary = json!({
@@ -241,7 +241,7 @@ fn print_baked(out: &mut String, view: &BakedView<'_>, byte_count: usize, as_jso
         byte_count as f64 / 1e6,
         ((exact.tiles().len() + exact.inverse_diagonals().len()) * 64 + exact.tile_rows().len() * 4) as f64 / 1e6,
         exact.tiles().len(),
-        (exact.entry_values().len() * 22) as f64 / 1e6
+        size_of_val(exact.patch_values()) as f64 / 1e6
     );
     let _ = writeln!(
         out,
@@ -260,10 +260,7 @@ fn print_baked(out: &mut String, view: &BakedView<'_>, byte_count: usize, as_jso
         let _ = writeln!(
             out,
             "{:<18} {:>8.2} .. {:>6.2} {:>9}",
-            c.name,
-            c.minimum,
-            c.maximum,
-            exact.entries_of(k).0.len()
+            c.name, c.minimum, c.maximum, vertex_counts[k]
         );
     }
 }

@@ -37,18 +37,14 @@ impl FeatureDecoder {
     pub fn new(package: &BakedView<'_>) -> Self {
         let (exact, vertex_count) = (package.exact(), package.vertex_count());
         let mut rows: Vec<Vec<Entry>> = vec![Vec::new(); vertex_count];
-        for (k, component) in package.components().enumerate() {
-            let support = exact.support_of(component.block as usize);
-            let (slots, values) = exact.entries_of(k);
-            for (&slot, bits) in slots.iter().zip(values) {
-                let vertex = package.vertex_from_solver()[support[slot as usize] as usize] as usize;
-                let value = bits.map(|b| f16::from_bits(b).to_f32() * component.value_scale);
-                rows[vertex].push(Entry {
-                    component: k as u32,
-                    block: component.block,
-                    value,
-                });
-            }
+        for entry in exact.entries() {
+            let component = package.component(entry.component);
+            let value = entry.values.map(|b| f16::from_bits(b).to_f32() * component.value_scale);
+            rows[package.vertex_from_lane()[entry.lane] as usize].push(Entry {
+                component: entry.component as u32,
+                block: component.block,
+                value,
+            });
         }
         let mut offsets = vec![0];
         for row in &rows {

@@ -70,9 +70,11 @@ impl<'p> Player<'p> {
         Ok(&self.positions)
     }
 
-    /// Decoded features of the positions last played, network units. Shape: `[V]`, solver order.
-    pub fn features(&self) -> &[[f32; FEATURE_COUNT]] {
-        self.workspace.features()
+    /// Decoded features of the positions last played, network units. Shape: `[V]`, source order.
+    pub fn features(&self) -> Result<Vec<[f32; FEATURE_COUNT]>, PlayError> {
+        let mut features = vec![[0.0; FEATURE_COUNT]; self.basis.vertex_count()];
+        self.workspace.features(self.basis, &mut features)?;
+        Ok(features)
     }
 
     /// Derivative of the positions last played with respect to the weight of `component`. Shape: `displacement` `[V]`.

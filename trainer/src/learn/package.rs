@@ -185,7 +185,7 @@ fn measure_strengths(basis: &mut LearnedBasis, config: &TrainConfig) -> Result<V
         let mut weights = vec![0.0; stops.len()];
         weights[k] = stops[k];
         let positions = player.play(&weights)?.to_vec();
-        let change = mean_above(player.features().iter().map(|x| norm(x)), moved);
+        let change = mean_above(player.features()?.iter().map(|x| norm(x)), moved);
         let displaced = positions
             .iter()
             .zip(rest)

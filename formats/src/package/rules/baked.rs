@@ -2,7 +2,10 @@
 //! errors bear the same names.
 
 use super::{
-    super::{BakedView, FastView, OpenError, SKIN_WEIGHT_SUM, TILE_ENTRIES, TILE_SIDE, TierView, limits},
+    super::{
+        BakedView, FAN_VERTICES, FastView, GROUP_NODES, OpenError, SKIN_WEIGHT_SUM, TILE_ENTRIES, TILE_SIDE, TierView,
+        limits,
+    },
     BlockLinks, ascending_below, below, control, count, faces, finite_halves, names, offsets, positions, positive,
     same_count, tree, within,
 };
@@ -11,7 +14,12 @@ use super::{
 pub(in super::super) fn check(view: &BakedView<'_>) -> Result<(), OpenError> {
     let vertex_count = positions(view.exact().rest_positions(), 3)?;
     faces(view.faces(), vertex_count)?;
-    permutation(view, vertex_count)?;
+    permutation(
+        ["lane_from_vertex", "vertex_from_lane"],
+        [view.lane_from_vertex(), view.vertex_from_lane()],
+        vertex_count,
+    )?;
+    fans(view, vertex_count)?;
     positive("rotation_scale", 0, view.rotation_scale(), limits::FEATURE_SCALE)?;
     positive("stretch_scale", 0, view.stretch_scale(), limits::FEATURE_SCALE)?;
     let links = |b| {
@@ -52,13 +60,6 @@ fn fast_tier(view: &BakedView<'_>, fast: &FastView<'_>, vertex_count: usize) -> 
     for coordinate in fast.centre() {
         within("fast.centre", 0, coordinate, -limits::POSITION, limits::POSITION)?;
     }
-    let (exact, order) = (view.exact().rest_positions(), view.solver_from_vertex());
-    same_count("fast.rest_positions", fast.rest_positions().len(), vertex_count)?;
-    for (v, (position, &solver)) in fast.rest_positions().iter().zip(order).enumerate() {
-        if position.map(f32::to_bits) != exact[solver as usize].map(f32::to_bits) {
-            return Err(OpenError::RestDiffers { vertex: v });
-        }
-    }
     skin(fast, vertex_count, node_count)?;
     let error = fast.error();
     let figures = [
@@ -79,29 +80,28 @@ fn skin(fast: &FastView<'_>, vertex_count: usize, node_count: usize) -> Result<(
     let (nodes, weights) = (fast.skin_nodes(), fast.skin_weights());
     same_count("skin_nodes", nodes.len(), vertex_count)?;
     same_count("skin_weights", weights.len(), vertex_count)?;
-    for (v, (row, weights)) in nodes.iter().zip(weights).enumerate() {
+    for (lane, (row, weights)) in nodes.iter().zip(weights).enumerate() {
         for &node in row {
-            below("skin_nodes", v, u32::from(node), node_count)?;
+            below("skin_nodes", lane, u32::from(node), node_count)?;
         }
         let sum = weights.iter().map(|&weight| u32::from(weight)).sum();
         if sum != SKIN_WEIGHT_SUM {
-            return Err(OpenError::SkinWeightSum { vertex: v, sum });
+            return Err(OpenError::SkinWeightSum { lane, sum });
         }
     }
     Ok(())
 }
 
-/// Both lists have V indices < V and the second undoes the first, so both are permutations.
-fn permutation(view: &BakedView<'_>, vertex_count: usize) -> Result<(), OpenError> {
-    let (solver_from_vertex, vertex_from_solver) = (view.solver_from_vertex(), view.vertex_from_solver());
-    same_count("solver_from_vertex", solver_from_vertex.len(), vertex_count)?;
-    same_count("vertex_from_solver", vertex_from_solver.len(), vertex_count)?;
-    for (v, &solver) in solver_from_vertex.iter().enumerate() {
-        below("solver_from_vertex", v, solver, vertex_count)?;
-        if vertex_from_solver[solver as usize] as usize != v {
+/// Both lists have `count` indices < `count` and the second undoes the first, so both are permutations.
+fn permutation(fields: [&'static str; 2], lists: [&[u32]; 2], count: usize) -> Result<(), OpenError> {
+    same_count(fields[0], lists[0].len(), count)?;
+    same_count(fields[1], lists[1].len(), count)?;
+    for (index, &image) in lists[0].iter().enumerate() {
+        below(fields[0], index, image, count)?;
+        if lists[1][image as usize] as usize != index {
             return Err(OpenError::NotAPermutation {
-                field: "solver_from_vertex",
-                index: v,
+                field: fields[0],
+                index,
             });
         }
     }
@@ -112,8 +112,8 @@ fn permutation(view: &BakedView<'_>, vertex_count: usize) -> Result<(), OpenErro
 fn tier(view: &BakedView<'_>, tier: &TierView<'_>, least_weight: f32) -> Result<(), OpenError> {
     rings(tier, least_weight)?;
     factor(tier)?;
-    supports(view, tier)?;
-    entries(view, tier)
+    lanes(tier)?;
+    patches(view, tier)
 }
 
 fn rings(tier: &TierView<'_>, least_weight: f32) -> Result<(), OpenError> {
@@ -188,36 +188,63 @@ fn matrices(field: &'static str, values: &[[f32; TILE_ENTRIES]], greatest: f32) 
     Ok(())
 }
 
-fn supports(view: &BakedView<'_>, tier: &TierView<'_>) -> Result<(), OpenError> {
-    let support = tier.support();
-    count("support", support.len(), 0, limits::ENTRIES)?;
-    offsets(
-        "support_offsets",
-        tier.support_offsets(),
-        view.block_count(),
-        support.len(),
-    )?;
-    for b in 0..view.block_count() {
-        let start = tier.support_offsets()[b] as usize;
-        ascending_below("support", start, tier.support_of(b), tier.node_count())?;
+fn lanes(tier: &TierView<'_>) -> Result<(), OpenError> {
+    permutation(
+        ["solver_from_lane", "lane_from_solver"],
+        [tier.solver_from_lane(), tier.lane_from_solver()],
+        tier.node_count(),
+    )
+}
+
+fn patches(view: &BakedView<'_>, tier: &TierView<'_>) -> Result<(), OpenError> {
+    let (owners, values) = (tier.patch_owners(), tier.patch_values());
+    count("patch_owners", owners.len(), 0, limits::PATCHES)?;
+    same_count("patch_values", values.len(), owners.len())?;
+    let group_count = tier.node_count().div_ceil(GROUP_NODES);
+    offsets("patch_offsets", tier.patch_offsets(), group_count, owners.len())?;
+    for row in tier.patch_offsets().windows(2) {
+        let mut previous = None;
+        for index in row[0] as usize..row[1] as usize {
+            let [component, block] = owners[index];
+            below("patch_owners", index, u32::from(component), view.component_count())?;
+            if previous.is_some_and(|previous| component <= previous) {
+                return Err(OpenError::NotAscending {
+                    field: "patch_owners",
+                    index,
+                });
+            }
+            // Components stand in block order, so the blocks ascend too.
+            if view.component(component as usize).block != u32::from(block) {
+                return Err(OpenError::NotContiguous {
+                    field: "patch_owners",
+                    index,
+                });
+            }
+            previous = Some(component);
+        }
+    }
+    for (patch, rows) in values.iter().enumerate() {
+        finite_halves("patch_values", rows).map_err(|_| OpenError::NotFinite {
+            field: "patch_values",
+            index: patch,
+        })?;
     }
     Ok(())
 }
 
-fn entries(view: &BakedView<'_>, tier: &TierView<'_>) -> Result<(), OpenError> {
-    let (slots, values) = (tier.entry_slots(), tier.entry_values());
-    count("entry_slots", slots.len(), 0, limits::ENTRIES)?;
-    same_count("entry_values", values.len(), slots.len())?;
+fn fans(view: &BakedView<'_>, vertex_count: usize) -> Result<(), OpenError> {
+    let fans = view.fans();
+    count("fans", fans.len(), 0, limits::FANS)?;
     offsets(
-        "entry_offsets",
-        tier.entry_offsets(),
-        view.component_count(),
-        slots.len(),
+        "fan_offsets",
+        view.fan_offsets(),
+        vertex_count.div_ceil(FAN_VERTICES),
+        fans.len(),
     )?;
-    for (k, component) in view.components().enumerate() {
-        let support_count = tier.support_of(component.block as usize).len();
-        let start = tier.entry_offsets()[k] as usize;
-        ascending_below("entry_slots", start, tier.entries_of(k).0, support_count)?;
+    for (index, lanes) in fans.iter().enumerate() {
+        for &lane in lanes {
+            below("fans", index, lane, vertex_count)?;
+        }
     }
-    finite_halves("entry_values", values)
+    Ok(())
 }

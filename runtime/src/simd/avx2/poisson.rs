@@ -8,7 +8,8 @@
 use core::arch::x86_64::*;
 
 use crate::simd::Kernels;
-use crate::simd::scalar::poisson::{Block, FLUSH_BELOW, Factor, Gradient, Lane, Rings};
+use crate::simd::lanes::Gradient;
+use crate::simd::scalar::poisson::{Block, FLUSH_BELOW, Factor, Lane, Rings};
 
 /// Tiles that the solve fetches ahead: the factor comes from the third-level cache.
 const PREFETCHED_TILES: isize = 24;
@@ -30,7 +31,12 @@ pub(crate) fn substitute(factor: &Factor<'_>, x: &mut [Block]) {
 #[target_feature(enable = "avx2,fma")]
 fn right_hand_side_avx2(rings: &Rings<'_>, rest: &[[f32; 3]], gradients: &[Gradient], b: &mut [Lane]) {
     let mut start = rings.offsets[0] as usize;
-    for (i, (r, d)) in rest.iter().zip(gradients).enumerate() {
+    for (i, (&solver, (r, d))) in rings
+        .solver_from_lane
+        .iter()
+        .zip(rest.iter().zip(gradients))
+        .enumerate()
+    {
         let end = rings.offsets[i + 1] as usize;
         let r = load_point(r);
         let (mut sums, mut total) = ([_mm_setzero_ps(); 3], _mm_setzero_ps());
@@ -46,7 +52,7 @@ fn right_hand_side_avx2(rings: &Rings<'_>, rest: &[[f32; 3]], gradients: &[Gradi
         let half = _mm_mul_ps(both, _mm_set1_ps(0.5));
         let kept = _mm_cmp_ps::<_CMP_NLT_UQ>(_mm_andnot_ps(_mm_set1_ps(-0.0), half), _mm_set1_ps(FLUSH_BELOW));
         // SAFETY: a lane is four floats.
-        unsafe { _mm_storeu_ps(b[i].as_mut_ptr(), _mm_and_ps(kept, half)) }
+        unsafe { _mm_storeu_ps(b[solver as usize].as_mut_ptr(), _mm_and_ps(kept, half)) }
     }
 }
 

@@ -10,17 +10,19 @@ use core::arch::x86_64::*;
 use sinew_formats::package::SKIN_NODES;
 
 use crate::simd::Kernels;
-use crate::simd::scalar::skin::{Map, Skin, UNIT};
+use crate::simd::scalar::poisson::Lane;
+use crate::simd::scalar::skin::{Map, Skin, Skinned, UNIT};
+use crate::simd::scalar::surface::Bounds;
 
 /// See [`skin`](crate::simd::scalar::skin::skin).
-pub(crate) fn skin(skin: &Skin<'_>, maps: &[Map], positions: &mut [[f32; 3]]) -> bool {
+pub(crate) fn skin(skin: &Skin<'_>, maps: &[Map], skinned: Skinned<'_>) -> Option<Bounds> {
     assert!(Kernels::Avx2.run_here());
     // SAFETY: the instructions are present.
-    unsafe { skin_avx2(skin, maps, positions) }
+    unsafe { skin_avx2(skin, maps, skinned) }
 }
 
 #[target_feature(enable = "avx2,fma")]
-fn skin_avx2(skin: &Skin<'_>, maps: &[Map], positions: &mut [[f32; 3]]) -> bool {
+fn skin_avx2(skin: &Skin<'_>, maps: &[Map], skinned: Skinned<'_>) -> Option<Bounds> {
     let [x, y, z] = skin.centre;
     // The arm gets a one as its fourth coordinate, which takes the offset.
     let centre = _mm_setr_ps(x, y, z, -1.0);
@@ -28,9 +30,9 @@ fn skin_avx2(skin: &Skin<'_>, maps: &[Map], positions: &mut [[f32; 3]]) -> bool 
         _mm256_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1),
         _mm256_setr_epi32(2, 2, 2, 2, 3, 3, 3, 3),
     );
-    let mut lost = _mm_setzero_ps();
-    let rows = skin.nodes.iter().zip(skin.weights);
-    for ((position, r), (nodes, weights)) in positions.iter_mut().zip(skin.rest).zip(rows) {
+    let mut extent = Extent::new();
+    let rows = skin.nodes.iter().zip(skin.weights).zip(skin.rest);
+    for ((((nodes, weights), r), posed), &v) in rows.zip(skinned.posed).zip(skin.vertex_from_lane) {
         let weights = _mm256_castps128_ps256(load_weights(weights));
         let (mut low, mut high) = (_mm256_setzero_ps(), _mm256_setzero_ps());
         for (n, &node) in nodes.iter().enumerate() {
@@ -44,9 +46,9 @@ fn skin_avx2(skin: &Skin<'_>, maps: &[Map], positions: &mut [[f32; 3]]) -> bool 
         let moved = _mm256_mul_ps(low, _mm256_permutevar8x32_ps(arm, first_two));
         let moved = _mm256_fmadd_ps(high, _mm256_permutevar8x32_ps(arm, last_two), moved);
         let sum = _mm_add_ps(_mm256_castps256_ps128(moved), _mm256_extractf128_ps::<1>(moved));
-        lost = _mm_or_ps(lost, store_point(_mm_add_ps(r, sum), position));
+        extent.store(_mm_add_ps(r, sum), posed, &mut skinned.positions[v as usize]);
     }
-    _mm_movemask_ps(lost) == 0
+    extent.bounds()
 }
 
 #[target_feature(enable = "avx2")]
@@ -78,13 +80,50 @@ pub(in crate::simd) fn load_point(point: &[f32; 3]) -> __m128 {
     _mm_setr_ps(x, y, z, 0.0)
 }
 
-/// Writes x y z; a lane is set where it is not finite.
-#[target_feature(enable = "avx2")]
-pub(in crate::simd) fn store_point(point: __m128, target: &mut [f32; 3]) -> __m128 {
-    let mut lanes = [0.0; 4];
-    // SAFETY: lanes are four floats.
-    unsafe { _mm_storeu_ps(lanes.as_mut_ptr(), point) }
-    *target = [lanes[0], lanes[1], lanes[2]];
-    let magnitude = _mm_andnot_ps(_mm_set1_ps(-0.0), point);
-    _mm_cmp_ps::<_CMP_NLE_UQ>(magnitude, _mm_set1_ps(f32::MAX))
+/// The box of what was stored, and whether all of it was finite.
+pub(in crate::simd) struct Extent {
+    least: __m128,
+    greatest: __m128,
+    /// Set lanes have held what is not finite.
+    lost: __m128,
+}
+
+impl Extent {
+    #[target_feature(enable = "avx2")]
+    pub(in crate::simd) fn new() -> Self {
+        Self {
+            least: _mm_set1_ps(f32::INFINITY),
+            greatest: _mm_set1_ps(f32::NEG_INFINITY),
+            lost: _mm_setzero_ps(),
+        }
+    }
+
+    /// Writes x y z and zero, and x y z.
+    #[target_feature(enable = "avx2")]
+    pub(in crate::simd) fn store(&mut self, point: __m128, posed: &mut Lane, position: &mut [f32; 3]) {
+        // SAFETY: a lane is four floats.
+        unsafe { _mm_storeu_ps(posed.as_mut_ptr(), point) }
+        *position = [posed[0], posed[1], posed[2]];
+        self.least = _mm_min_ps(self.least, point);
+        self.greatest = _mm_max_ps(self.greatest, point);
+        let magnitude = _mm_andnot_ps(_mm_set1_ps(-0.0), point);
+        let lost = _mm_cmp_ps::<_CMP_NLE_UQ>(magnitude, _mm_set1_ps(f32::MAX));
+        self.lost = _mm_or_ps(self.lost, lost);
+    }
+
+    /// Nothing where something was not finite.
+    #[target_feature(enable = "avx2")]
+    pub(in crate::simd) fn bounds(&self) -> Option<Bounds> {
+        let point = |lanes: __m128| {
+            let mut point = [0.0; 4];
+            // SAFETY: a lane is four floats.
+            unsafe { _mm_storeu_ps(point.as_mut_ptr(), lanes) }
+            [point[0], point[1], point[2]]
+        };
+        let all_finite = _mm_movemask_ps(self.lost) == 0;
+        all_finite.then(|| Bounds {
+            minimum: point(self.least),
+            maximum: point(self.greatest),
+        })
+    }
 }

@@ -8,25 +8,26 @@
 use core::arch::x86_64::*;
 
 use crate::simd::Kernels;
-use crate::simd::avx2::skin::{load_point, load_weights, store_point};
-use crate::simd::scalar::skin::{Map, Skin};
+use crate::simd::avx2::skin::{Extent, load_point, load_weights};
+use crate::simd::scalar::skin::{Map, Skin, Skinned};
+use crate::simd::scalar::surface::Bounds;
 
 /// See [`skin`](crate::simd::scalar::skin::skin).
-pub(crate) fn skin(skin: &Skin<'_>, maps: &[Map], positions: &mut [[f32; 3]]) -> bool {
+pub(crate) fn skin(skin: &Skin<'_>, maps: &[Map], skinned: Skinned<'_>) -> Option<Bounds> {
     assert!(Kernels::Avx512.run_here());
     // SAFETY: the instructions are present.
-    unsafe { skin_avx512(skin, maps, positions) }
+    unsafe { skin_avx512(skin, maps, skinned) }
 }
 
 #[target_feature(enable = "avx2,fma,avx512f,avx512dq,avx512vl")]
-fn skin_avx512(skin: &Skin<'_>, maps: &[Map], positions: &mut [[f32; 3]]) -> bool {
+fn skin_avx512(skin: &Skin<'_>, maps: &[Map], skinned: Skinned<'_>) -> Option<Bounds> {
     let [x, y, z] = skin.centre;
     // The arm gets a one as its fourth coordinate, which takes the offset.
     let centre = _mm_setr_ps(x, y, z, -1.0);
     let over_columns = _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
-    let mut lost = _mm_setzero_ps();
-    let rows = skin.nodes.iter().zip(skin.weights);
-    for ((position, r), (nodes, weights)) in positions.iter_mut().zip(skin.rest).zip(rows) {
+    let mut extent = Extent::new();
+    let rows = skin.nodes.iter().zip(skin.weights).zip(skin.rest);
+    for ((((nodes, weights), r), posed), &v) in rows.zip(skinned.posed).zip(skin.vertex_from_lane) {
         let weights = _mm512_castps128_ps512(load_weights(weights));
         let weight = |n| _mm512_permutexvar_ps(_mm512_set1_epi32(n), weights);
         let map = |n: usize| load_map(&maps[usize::from(nodes[n])]);
@@ -39,9 +40,9 @@ fn skin_avx512(skin: &Skin<'_>, maps: &[Map], positions: &mut [[f32; 3]]) -> boo
         let moved = _mm512_mul_ps(blended, _mm512_permutexvar_ps(over_columns, arm));
         let halves = _mm256_add_ps(_mm512_castps512_ps256(moved), _mm512_extractf32x8_ps::<1>(moved));
         let sum = _mm_add_ps(_mm256_castps256_ps128(halves), _mm256_extractf128_ps::<1>(halves));
-        lost = _mm_or_ps(lost, store_point(_mm_add_ps(r, sum), position));
+        extent.store(_mm_add_ps(r, sum), posed, &mut skinned.positions[v as usize]);
     }
-    _mm_movemask_ps(lost) == 0
+    extent.bounds()
 }
 
 #[target_feature(enable = "avx512f")]

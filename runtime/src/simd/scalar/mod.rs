@@ -1,8 +1,6 @@
 //! The scalar kernels, in the order of the frame: blend, gradient, poisson, surface. Fixed summation order and every
 //! transcendental function through `libm`, so one input gives the same bits on every machine.
 
-pub(crate) mod blend;
-pub(crate) mod gradient;
 pub(crate) mod poisson;
 pub(crate) mod skin;
 pub(crate) mod surface;

@@ -4,8 +4,7 @@
 //! symmetric c the normal equations are `sum_j c_ij (d_i - d_j) = 1/2 sum_j c_ij (D_i + D_j)(r_i - r_j)`. The factor
 //! holds `L` and the penalty that keeps the anchor vertex at zero.
 
-/// `D = T - I`, or a derivative of it, as the right-hand side reads it: three columns, each filled up with a zero.
-pub(crate) type Gradient = [[f32; 4]; 3];
+use crate::simd::lanes::Gradient;
 
 /// What one node has in a right-hand side or a solution: x, y, z, and a zero.
 pub(crate) type Lane = [f32; 4];
@@ -29,6 +28,8 @@ pub(crate) struct Rings<'a> {
     pub(crate) neighbours: &'a [u32],
     /// Shape: `[2 * edges]`.
     pub(crate) weights: &'a [f32],
+    /// Where each row's right-hand side goes. Shape: `[V]`, a permutation.
+    pub(crate) solver_from_lane: &'a [u32],
 }
 
 /// `F D F^T` in tiles: F block unit lower triangular, D block diagonal. T = ceil(N / 4) columns of tiles.
@@ -55,9 +56,10 @@ impl<'a> Factor<'a> {
 
 /// `b_i = 1/2 (D_i g_i + sum_j D_j e_ij)` with `e_ij = c_ij (r_i - r_j)` and `g_i = sum_j e_ij`.
 ///
-/// Shape: `rest` and `gradients` `[N]`, `b` at least `[N]`; solver order.
+/// Shape: `rest` and `gradients` `[N]`, lanes; `b` at least `[N]`, solver order.
 pub(crate) fn right_hand_side(rings: &Rings<'_>, rest: &[[f32; 3]], gradients: &[Gradient], b: &mut [Lane]) {
-    for (i, (r, d)) in rest.iter().zip(gradients).enumerate() {
+    for (i, &solver) in rings.solver_from_lane.iter().enumerate() {
+        let (r, d) = (&rest[i], &gradients[i]);
         let mut sum = [0.0_f32; 3];
         let mut total = [0.0_f32; 3];
         let ring = rings.offsets[i] as usize..rings.offsets[i + 1] as usize;
@@ -71,7 +73,7 @@ pub(crate) fn right_hand_side(rings: &Rings<'_>, rest: &[[f32; 3]], gradients: &
         }
         add_product(&mut sum, d, &total);
         let [x, y, z] = sum.map(|x| flushed(0.5 * x));
-        b[i] = [x, y, z, 0.0];
+        b[solver as usize] = [x, y, z, 0.0];
     }
 }
 

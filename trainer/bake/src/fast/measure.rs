@@ -140,7 +140,7 @@ impl<'a> Measure<'a> {
         for poses in poses.chunks(POSES_AT_ONCE) {
             let tallies: Vec<Tally> = poses
                 .par_iter()
-                .map(|weights| self.compare(&self.exact.play(weights), &fast.play_in_solver_order(weights)))
+                .map(|weights| self.compare(&self.exact.play(weights), &fast.play_in_lanes(weights)))
                 .collect();
             // One after the other: sums do not depend on the threads.
             tallies.iter().for_each(|tally| sum.add(tally));
@@ -193,8 +193,14 @@ impl<'a> Measure<'a> {
                 (nodes.gradients[n], offset)
             })
             .collect();
-        let rows = fast.skin_nodes.iter().zip(&fast.skin_weights).zip(&fast.rest_positions);
-        rows.map(|((row, weights), rest)| {
+        let exact = self.source.exact;
+        let rows = fast
+            .skin_nodes
+            .iter()
+            .zip(&fast.skin_weights)
+            .zip(&exact.rest_positions);
+        let mut skinned = vec![[0.0; 3]; exact.node_count()];
+        for (((row, weights), rest), &vertex) in rows.zip(&exact.node_from_lane) {
             let arm = core::array::from_fn(|c| f64::from(rest[c]) - centre[c]);
             let mut sum = [0.0; 3];
             for (&node, &weight) in row.iter().zip(weights) {
@@ -205,9 +211,9 @@ impl<'a> Measure<'a> {
                     sum[c] += share * (turned[c] + offset[c]);
                 }
             }
-            sum
-        })
-        .collect()
+            skinned[vertex as usize] = sum;
+        }
+        skinned
     }
 }
 

@@ -36,7 +36,6 @@ pub struct Fast {
     /// At the nodes, in their solver order. Shape: `[K]`.
     components: Vec<FoldedComponent>,
     centre: [f32; 3],
-    rest_positions: Vec<[f32; 3]>,
     skin_nodes: Vec<[u16; SKIN_NODES]>,
     skin_weights: Vec<[u16; SKIN_NODES]>,
     /// What was measured.
@@ -76,16 +75,15 @@ impl Fast {
         let order = EliminationOrder::new(&laplacian)?;
         let components = at_nodes(source, &nodes, &order.solver_from_vertex);
         let rest: Vec<[f32; 3]> = nodes.iter().map(|&v| source.rest_positions[v as usize]).collect();
-        let component_counts = source.network.component_counts();
-        let tier = Tier::new(&laplacian, order, &rest, &components, &component_counts)?;
+        let blocks = source.network.block_of_component();
+        let tier = Tier::new(&laplacian, order, &rest, &components, &blocks)?;
 
-        let solver_from_node = &tier.solver_from_node;
-        let in_solver_order = |row: &[u16; SKIN_NODES]| row.map(|node| solver_from_node[usize::from(node)] as u16);
+        let in_lanes = |row: [u16; SKIN_NODES]| row.map(|node| tier.lane_from_node[usize::from(node)] as u16);
+        let vertices = || source.exact.node_from_lane.iter().map(|&v| v as usize);
         let mut fast = Self {
             centre: middle(source.rest_positions),
-            rest_positions: source.rest_positions.to_vec(),
-            skin_nodes: skin.nodes.iter().map(in_solver_order).collect(),
-            skin_weights: skin.weights,
+            skin_nodes: vertices().map(|v| in_lanes(skin.nodes[v])).collect(),
+            skin_weights: vertices().map(|v| skin.weights[v]).collect(),
             components,
             error: FastError {
                 mixed_rms: 0.0,
@@ -107,7 +105,6 @@ impl Fast {
         BakedFast {
             nodes: self.nodes.record(),
             centre: self.centre,
-            rest_positions: &self.rest_positions,
             skin_nodes: &self.skin_nodes,
             skin_weights: &self.skin_weights,
             error: self.error,

@@ -26,9 +26,9 @@ pub struct Network<'a> {
 }
 
 impl Network<'_> {
-    /// Components of each block. Shape: `[B]`.
-    pub fn component_counts(&self) -> Vec<usize> {
-        self.blocks.iter().map(|block| block.component_count as usize).collect()
+    /// The block of each component. Shape: `[K]`.
+    pub fn block_of_component(&self) -> Vec<u32> {
+        self.components.iter().map(|component| component.block).collect()
     }
 
     /// Mixed poses: every control moves in the given share of them, and then stands between its stops, evenly spread; which
@@ -115,31 +115,36 @@ impl<'a> Player<'a> {
 
     /// One pose, in the tier's node order. Shape: `weights` `[K]`.
     pub fn play(&self, weights: &[f64]) -> Pose {
-        let pose = self.play_in_solver_order(weights);
-        let order = || self.tier.solver_from_node.iter().map(|&solver| solver as usize);
+        let pose = self.play_in_lanes(weights);
+        let order = || self.tier.lane_from_node.iter().map(|&lane| lane as usize);
         Pose {
-            gradients: order().map(|solver| pose.gradients[solver]).collect(),
-            displacement: order().map(|solver| pose.displacement[solver]).collect(),
+            gradients: order().map(|lane| pose.gradients[lane]).collect(),
+            displacement: order().map(|lane| pose.displacement[lane]).collect(),
         }
     }
 
-    /// One pose, in the tier's solver order. Shape: `weights` `[K]`.
-    pub fn play_in_solver_order(&self, weights: &[f64]) -> Pose {
+    /// One pose, in the tier's lanes. Shape: `weights` `[K]`.
+    pub fn play_in_lanes(&self, weights: &[f64]) -> Pose {
         let features = self.features(weights);
         let rotation = f64::from(self.network.rotation_scale);
         let stretch = f64::from(self.network.stretch_scale);
-        let gradients: Vec<Gradient> = features
-            .iter()
-            .map(|x| gradient(&core::array::from_fn(|c| x[c] * if c < 3 { rotation } else { stretch })))
-            .collect();
-        let mut displacement = self.right_hand_side(&gradients);
-        self.substitute(&mut displacement);
+        let of_features = |x: &[f64; FEATURE_COUNT]| {
+            gradient(&core::array::from_fn(|c| x[c] * if c < 3 { rotation } else { stretch }))
+        };
+        let lanes = || self.tier.lanes.solver_from_lane.iter().map(|&solver| solver as usize);
+        let gradients: Vec<Gradient> = lanes().map(|solver| of_features(&features[solver])).collect();
+        let mut solved = vec![[0.0; 3]; gradients.len()];
+        for (solver, b) in lanes().zip(self.right_hand_side(&gradients)) {
+            solved[solver] = b;
+        }
+        self.substitute(&mut solved);
         Pose {
             gradients,
-            displacement,
+            displacement: lanes().map(|solver| solved[solver]).collect(),
         }
     }
 
+    /// In solver order. Shape: `[N]`.
     fn features(&self, weights: &[f64]) -> Vec<[f64; FEATURE_COUNT]> {
         let nothing = vec![[0.0; FEATURE_COUNT]; self.tier.node_count()];
         let (mut features, mut sums) = (nothing.clone(), nothing);
@@ -169,6 +174,7 @@ impl<'a> Player<'a> {
         features
     }
 
+    /// In lanes. Shape: `[N]`.
     fn right_hand_side(&self, gradients: &[Gradient]) -> Vec<[f64; 3]> {
         let (rings, rest) = (&self.tier.rings, &self.tier.rest_positions);
         let row = |i: usize| {
@@ -187,7 +193,7 @@ impl<'a> Player<'a> {
         (0..gradients.len()).map(row).collect()
     }
 
-    /// `F D F^T x = b` by tiles, in place.
+    /// `F D F^T x = b` by tiles, in place, in solver order.
     fn substitute(&self, b: &mut [[f64; 3]]) {
         let factor = &self.tier.factor;
         let tile_columns = |column: usize| factor.offsets[column] as usize..factor.offsets[column + 1] as usize;

@@ -1,7 +1,7 @@
 //! The fast tier against its definitions: the graph's matrix, its rules of motion, and the error it states.
 
 use rayon::ThreadPoolBuilder;
-use sinew_formats::package::{BakedView, CompactView, SKIN_WEIGHT_SUM};
+use sinew_formats::package::{BakedView, CompactView, FEATURE_COUNT, SKIN_WEIGHT_SUM};
 
 use crate::{BakeOptions, FastNodes, bake_bytes_with, fixture};
 
@@ -20,40 +20,25 @@ fn nodes_are_vertices_with_their_components() {
     let nodes = fast.nodes();
     assert_eq!(nodes.node_count(), view.vertex_count() / 4);
     // A node's own vertex follows it alone.
-    let mut own_vertex = vec![None; nodes.node_count()];
-    for (v, (row, weights)) in fast.skin_nodes().iter().zip(fast.skin_weights()).enumerate() {
-        if weights[0] as u32 == SKIN_WEIGHT_SUM {
-            let at = nodes.rest_positions()[row[0] as usize];
-            if at == fast.rest_positions()[v] {
-                own_vertex[row[0] as usize] = Some(v);
-            }
+    let mut node_of = vec![None; view.vertex_count()];
+    for (lane, (row, weights)) in fast.skin_nodes().iter().zip(fast.skin_weights()).enumerate() {
+        let at_node = nodes.rest_positions()[usize::from(row[0])] == exact.rest_positions()[lane];
+        if u32::from(weights[0]) == SKIN_WEIGHT_SUM && at_node {
+            node_of[lane] = Some(u32::from(row[0]));
         }
     }
-    let solvers: Vec<u32> = own_vertex
-        .iter()
-        .map(|v| view.solver_from_vertex()[v.expect("every node has its vertex")])
-        .collect();
-    for k in 0..view.component_count() {
-        let block = view.component(k).block as usize;
-        let (slots, values) = exact.entries_of(k);
-        let (node_slots, node_values) = nodes.entries_of(k);
-        let expected: Vec<_> = solvers
-            .iter()
-            .enumerate()
-            .filter_map(|(n, solver)| {
-                let slot = slots
-                    .iter()
-                    .position(|&slot| exact.support_of(block)[slot as usize] == *solver)?;
-                Some((n as u32, values[slot]))
-            })
-            .collect();
-        let found: Vec<_> = node_slots
-            .iter()
-            .zip(node_values)
-            .map(|(&slot, &value)| (nodes.support_of(block)[slot as usize], value))
-            .collect();
-        assert_eq!(found, expected, "component {k}");
-    }
+    assert_eq!(node_of.iter().flatten().count(), nodes.node_count());
+    let sorted = |mut entries: Vec<(usize, u32, [u16; FEATURE_COUNT])>| {
+        entries.sort_unstable();
+        entries
+    };
+    let expected = exact
+        .entries()
+        .filter_map(|entry| node_of[entry.lane].map(|node| (entry.component, node, entry.values)));
+    let found = nodes
+        .entries()
+        .map(|entry| (entry.component, entry.lane as u32, entry.values));
+    assert_eq!(sorted(found.collect()), sorted(expected.collect()));
 }
 
 /// `W^T L W`, entry by entry, from the stored skin and the exact tier's rings.
@@ -65,15 +50,10 @@ fn the_graphs_weights_are_the_galerkin_product() {
     let view = BakedView::open(&bytes).unwrap();
     let (exact, fast) = (view.exact(), view.fast().unwrap());
     let node_count = fast.nodes().node_count();
-    let skin: Vec<Vec<f64>> = view
-        .vertex_from_solver()
-        .iter()
-        .map(|&v| {
+    let skin: Vec<Vec<f64>> = (0..view.vertex_count())
+        .map(|v| {
             let mut row = vec![0.0; node_count];
-            for (&node, &weight) in fast.skin_nodes()[v as usize]
-                .iter()
-                .zip(&fast.skin_weights()[v as usize])
-            {
+            for (&node, &weight) in fast.skin_nodes()[v].iter().zip(&fast.skin_weights()[v]) {
                 row[node as usize] += f64::from(weight) / f64::from(SKIN_WEIGHT_SUM);
             }
             row

@@ -4,12 +4,31 @@ use super::*;
 
 #[test]
 fn permutation_rules() {
-    let (field, v) = ("solver_from_vertex", u64::from(V));
-    baked(|t| t.solver_from_vertex.truncate(8), counts(field, v, v - 1));
-    baked(|t| t.vertex_from_solver.push(0), counts("vertex_from_solver", v, v + 1));
-    baked(|t| t.solver_from_vertex[6] = V, beyond(field, 6, V, V));
-    baked(|t| t.solver_from_vertex[0] = 1, NotAPermutation { field, index: 0 });
-    baked(|t| t.vertex_from_solver.swap(0, 1), NotAPermutation { field, index: 0 });
+    let (field, v) = ("lane_from_vertex", u64::from(V));
+    baked(|t| t.lane_from_vertex.truncate(8), counts(field, v, v - 1));
+    baked(|t| t.vertex_from_lane.push(0), counts("vertex_from_lane", v, v + 1));
+    baked(|t| t.lane_from_vertex[6] = V, beyond(field, 6, V, V));
+    baked(|t| t.lane_from_vertex[0] = 1, NotAPermutation { field, index: 0 });
+    baked(|t| t.vertex_from_lane.swap(0, 1), NotAPermutation { field, index: 4 });
+    let (field, index) = ("solver_from_lane", 0);
+    baked(|t| t.exact.solver_from_lane.truncate(8), counts(field, v, v - 1));
+    baked(
+        |t| t.exact.lane_from_solver.push(0),
+        counts("lane_from_solver", v, v + 1),
+    );
+    baked(|t| t.exact.solver_from_lane[3] = V, beyond(field, 3, V, V));
+    baked(|t| t.exact.solver_from_lane[0] = 1, NotAPermutation { field, index });
+}
+
+#[test]
+fn fan_rules() {
+    let (field, tiny) = ("fan_offsets", tiny_baked());
+    let (rows, steps) = (tiny.fan_offsets.len() as u64, tiny.fans.len() as u64);
+    baked(|t| t.fan_offsets.truncate(2), counts(field, rows, 2));
+    baked(|t| t.fan_offsets[0] = 1, NotContiguous { field, index: 0 });
+    baked(|t| t.fan_offsets[1] = u32::MAX, NotAscending { field, index: 2 });
+    baked(|t| t.fans.push([0; 4]), counts(field, steps + 1, steps));
+    baked(|t| t.fans[2][3] = V, beyond("fans", 2, V, V));
 }
 
 #[test]
@@ -129,68 +148,28 @@ fn factor_rules() {
 }
 
 #[test]
-fn support_and_entry_rules() {
+fn patch_rules() {
     let tiny = tiny_baked().exact;
-    let (support_count, entry_count) = (tiny.support.len() as u64, tiny.entry_slots.len() as u64);
+    let patch_count = tiny.patch_owners.len() as u64;
     baked(|t| t.blocks[1].bias[4] = f32::NAN, not_finite("blocks.bias", 1));
-    let (last, end) = (tiny.support_offsets.len(), support_count);
+    let field = "patch_offsets";
+    baked(|t| t.exact.patch_offsets.push(4), counts(field, 2, 3));
+    baked(|t| t.exact.patch_offsets[0] = 1, NotContiguous { field, index: 0 });
+    baked(|t| t.exact.patch_offsets[1] = 3, counts(field, patch_count, 3));
+    let field = "patch_owners";
     baked(
-        |t| t.exact.support_offsets.truncate(last - 1),
-        counts("support_offsets", last as u64, last as u64 - 1),
+        |t| t.exact.patch_values.truncate(1),
+        counts("patch_values", patch_count, 1),
     );
+    let (unknown, limit) = (COMPONENT_COUNT as u16, COMPONENT_COUNT as u32);
+    baked(|t| t.exact.patch_owners[3][0] = unknown, beyond(field, 3, limit, limit));
+    baked(|t| t.exact.patch_owners[3][0] = 2, NotAscending { field, index: 3 });
+    baked(|t| t.exact.patch_owners.swap(0, 1), NotAscending { field, index: 1 });
+    baked(|t| t.exact.patch_owners[3][1] = 1, NotContiguous { field, index: 3 });
     baked(
-        |t| t.exact.support_offsets[0] = 1,
-        NotContiguous {
-            field: "support_offsets",
-            index: 0,
-        },
+        |t| t.exact.patch_values[2][8][15] = HALF_NAN,
+        not_finite("patch_values", 2),
     );
-    baked(
-        |t| t.exact.support_offsets[1] = u32::MAX,
-        NotAscending {
-            field: "support_offsets",
-            index: 2,
-        },
-    );
-    baked(|t| t.exact.support.push(0), counts("support_offsets", end + 1, end));
-    baked(
-        |t| t.exact.support.swap(0, 1),
-        NotAscending {
-            field: "support",
-            index: 1,
-        },
-    );
-    let last = support_count as usize - 1;
-    baked(|t| t.exact.support[last] = V, beyond("support", last, V, V));
-    baked(
-        |t| t.exact.entry_offsets[2] = 0,
-        NotAscending {
-            field: "entry_offsets",
-            index: 2,
-        },
-    );
-    baked(
-        |t| t.exact.entry_offsets[4] += 1,
-        counts("entry_offsets", entry_count, entry_count + 1),
-    );
-    baked(
-        |t| t.exact.entry_values.truncate(1),
-        counts("entry_values", entry_count, 1),
-    );
-    let own = tiny.support_offsets[3] - tiny.support_offsets[2];
-    let last = entry_count as usize - 1;
-    baked(
-        |t| t.exact.entry_slots[last] = own,
-        beyond("entry_slots", last, own, own),
-    );
-    baked(
-        |t| t.exact.entry_slots.swap(0, 1),
-        NotAscending {
-            field: "entry_slots",
-            index: 1,
-        },
-    );
-    baked(|t| t.exact.entry_values[7][0] = HALF_NAN, not_finite("entry_values", 7));
 }
 
 fn fast(damage: impl Fn(&mut TinyFast), expected: OpenError) {
@@ -224,8 +203,11 @@ fn rules_of_the_fast_tiers_nodes() {
     fast(|t| t.nodes.rest_positions[2][1] = f32::NAN, not_finite(field, 2));
     fast(|t| t.nodes.ring_weights[3] = f32::NAN, not_finite("ring_weights", 3));
     fast(|t| t.nodes.tiles[1][0] = f32::NAN, not_finite("tiles", 1));
-    fast(|t| t.nodes.support[0] = V, beyond("support", 0, V, V));
-    fast(|t| t.nodes.entry_values[7][0] = HALF_NAN, not_finite("entry_values", 7));
+    fast(|t| t.nodes.solver_from_lane[0] = V, beyond("solver_from_lane", 0, V, V));
+    fast(
+        |t| t.nodes.patch_values[3][0][7] = HALF_NAN,
+        not_finite("patch_values", 3),
+    );
 }
 
 #[test]
@@ -235,20 +217,13 @@ fn skin_rules() {
     fast(|t| t.skin_weights.push([0; 4]), counts("skin_weights", v, v + 1));
     fast(|t| t.skin_nodes[5][3] = V as u16, beyond("skin_nodes", 5, V, V));
     let sum = 65_534;
-    fast(|t| t.skin_weights[7][1] -= 1, SkinWeightSum { vertex: 7, sum });
+    fast(|t| t.skin_weights[7][1] -= 1, SkinWeightSum { lane: 7, sum });
     let sum = 4 * 65_535;
-    fast(|t| t.skin_weights[0] = [u16::MAX; 4], SkinWeightSum { vertex: 0, sum });
+    fast(|t| t.skin_weights[0] = [u16::MAX; 4], SkinWeightSum { lane: 0, sum });
 }
 
 #[test]
-fn the_fast_tier_has_the_exact_rest_shape_and_finite_figures() {
-    let v = u64::from(V);
-    fast(
-        |t| t.rest_positions.truncate(8),
-        counts("fast.rest_positions", v, v - 1),
-    );
-    fast(|t| t.rest_positions[6][2] += 0.5, RestDiffers { vertex: 6 });
-    fast(|t| t.rest_positions.swap(1, 2), RestDiffers { vertex: 1 });
+fn the_fast_tiers_figures_are_finite_and_not_negative() {
     fast(|t| t.centre[1] = f32::INFINITY, not_finite("fast.centre", 0));
     fast(|t| t.error.mixed_rms = f32::NAN, not_finite("fast.error.mixed_rms", 0));
     fast(

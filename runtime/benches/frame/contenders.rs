@@ -1,0 +1,204 @@
+//! Who takes part: the runtime's frames, and what engines and solvers offer instead.
+
+use core::hint::black_box;
+
+use sinew_peers::morph::MorphTargets;
+use sinew_peers::skinning::Skin;
+use sinew_peers::solvers::{FaerSimplicial, LowerTriangle};
+use sinew_peers::subject::Subject;
+use sinew_runtime::{Basis, Controls, Frame, Kernels, Normals, Reconstruct, Workspace, WorkspaceLayout};
+
+use crate::measure::Contender;
+
+/// Morph targets of the yardstick.
+const TARGETS: usize = 60;
+/// Bones of the rig.
+const BONES: usize = 20;
+/// Poses that the frames go through.
+const POSES: usize = 64;
+
+/// Builds them.
+pub struct Contenders;
+
+impl Contenders {
+    /// Hands all contenders on a subject to `then`.
+    pub fn of(subject: &Subject, then: impl FnOnce(&mut [Contender<'_>])) {
+        let basis = Basis::open(&subject.baked).expect("a sound package");
+        let mut contenders = Vec::new();
+        for kernels in [Kernels::Scalar, Kernels::Avx2, Kernels::Avx512] {
+            if kernels.run_here() {
+                let widest = kernels == Kernels::detect();
+                let all = basis.component_count();
+                contenders.push(frame(&basis, kernels, all, true));
+                if widest {
+                    contenders.push(frame(&basis, kernels, all, false));
+                    contenders.push(frame(&basis, kernels, all.min(10), true));
+                    contenders.push(unchanged(&basis, kernels));
+                    contenders.push(solve_path(&basis, kernels));
+                }
+            }
+        }
+        contenders.push(normals(&basis));
+        contenders.extend(morphs(subject));
+        contenders.push(skinning(subject));
+        contenders.extend(solvers(subject));
+        then(&mut contenders);
+    }
+}
+
+/// Memory that outlives the benchmark: a few contenders, once a run.
+fn workspace(basis: &Basis<'_>, kernels: Kernels) -> Workspace<'static> {
+    let memory = vec![0; WorkspaceLayout::for_basis(basis).unaligned_bytes()];
+    Workspace::with_kernels(basis, memory.leak(), kernels).expect("enough memory")
+}
+
+fn frame<'c>(basis: &'c Basis<'c>, kernels: Kernels, active: usize, with_normals: bool) -> Contender<'c> {
+    let mut workspace = workspace(basis, kernels);
+    let component_count = basis.component_count();
+    let poses: Vec<Vec<f32>> = (0..POSES).map(|n| Subject::pose(component_count, active, n)).collect();
+    let mut weights = vec![0.0; component_count];
+    let mut positions = vec![[0.0; 3]; basis.vertex_count()];
+    let mut normals = positions.clone();
+    let name = format!(
+        "frame, {kernels:?}, {active} active{}",
+        if with_normals { ", normals" } else { "" }
+    );
+    let run = move |round: usize| {
+        let mut controls = Controls::new(basis, &mut weights).expect("a weight a component");
+        for (k, &weight) in poses[round % POSES].iter().enumerate() {
+            controls.set(k, weight).expect("finite");
+        }
+        let frame = Frame {
+            basis,
+            controls: &controls,
+            positions: &mut positions,
+            normals: if with_normals { Some(&mut normals) } else { None },
+        };
+        frame.run(&mut workspace).expect("weights in range");
+    };
+    Contender {
+        name,
+        is_yardstick: false,
+        run: Box::new(run),
+    }
+}
+
+/// A frame in which no control moved.
+fn unchanged<'c>(basis: &'c Basis<'c>, kernels: Kernels) -> Contender<'c> {
+    let mut one = frame(basis, kernels, basis.component_count(), true);
+    Contender {
+        name: format!("frame, {kernels:?}, nothing moved"),
+        is_yardstick: false,
+        run: Box::new(move |_| (one.run)(0)),
+    }
+}
+
+/// Exponential map, right-hand side, solve, scatter: the frame behind the blend.
+fn solve_path<'c>(basis: &'c Basis<'c>, kernels: Kernels) -> Contender<'c> {
+    let mut workspace = workspace(basis, kernels);
+    let features: Vec<[f32; 9]> = (0..basis.vertex_count())
+        .map(|v| core::array::from_fn(|c| 0.3 * (0.01 * v as f32 + c as f32).sin()))
+        .collect();
+    let mut positions = vec![[0.0; 3]; basis.vertex_count()];
+    let run = move |_| {
+        let job = Reconstruct {
+            basis,
+            features: &features,
+            positions: &mut positions,
+        };
+        job.run(&mut workspace).expect("finite");
+    };
+    Contender {
+        name: format!("features to positions, {kernels:?}"),
+        is_yardstick: false,
+        run: Box::new(run),
+    }
+}
+
+fn normals<'c>(basis: &'c Basis<'c>) -> Contender<'c> {
+    let positions: Vec<[f32; 3]> = basis
+        .solver_from_vertex()
+        .iter()
+        .map(|&s| basis.rest_positions()[s as usize])
+        .collect();
+    let mut normals = positions.clone();
+    let run = move |_| {
+        let job = Normals {
+            basis,
+            positions: &positions,
+            normals: &mut normals,
+        };
+        job.run().expect("lengths agree");
+    };
+    Contender {
+        name: "normals alone".into(),
+        is_yardstick: false,
+        run: Box::new(run),
+    }
+}
+
+fn morphs<'c>(subject: &Subject) -> Vec<Contender<'c>> {
+    MorphTargets::loops()
+        .into_iter()
+        .map(|(name, run)| {
+            let morph = MorphTargets::new(&subject.rest, TARGETS);
+            let mut out = vec![0.0; 3 * subject.rest.len()];
+            Contender {
+                name: format!("peer: {TARGETS} morph targets {name}"),
+                is_yardstick: true,
+                run: Box::new(move |round| {
+                    let weights = Subject::pose(TARGETS, TARGETS, round);
+                    run(&morph, &weights, black_box(&mut out));
+                }),
+            }
+        })
+        .collect()
+}
+
+fn skinning<'c>(subject: &Subject) -> Contender<'c> {
+    let skin = Skin::new(&subject.rest, BONES);
+    let (mut positions, mut normals) = (subject.rest.clone(), subject.rest.clone());
+    Contender {
+        name: format!("peer: skinning, {BONES} bones, normals"),
+        is_yardstick: false,
+        run: Box::new(move |round| {
+            let pose = Skin::pose(BONES, 0.01 * (round % POSES) as f32);
+            skin.run(&pose, black_box(&mut positions), black_box(&mut normals));
+        }),
+    }
+}
+
+fn solvers<'c>(subject: &Subject) -> Vec<Contender<'c>> {
+    let surface = subject.surface();
+    let lower = LowerTriangle::of(&surface.laplacian(subject.anchor_vertex()));
+    let columns: Vec<f64> = (0..3 * lower.vertex_count()).map(|i| (0.01 * i as f64).sin()).collect();
+    let mut faer = FaerSimplicial::new(&lower);
+    let mut solution = columns.clone();
+    let start = columns.clone();
+    #[cfg_attr(not(feature = "cholmod"), expect(unused_mut, reason = "grows with the feature"))]
+    let mut solvers = vec![Contender {
+        name: "peer: faer simplicial solve, f64".into(),
+        is_yardstick: false,
+        run: Box::new(move |_| {
+            solution.copy_from_slice(&start);
+            faer.solve(black_box(&mut solution));
+        }),
+    }];
+    #[cfg(feature = "cholmod")]
+    {
+        use sinew_peers::cholmod::{Cholmod, Mode};
+        solvers.extend(Mode::ALL.into_iter().filter_map(|mode| {
+            let mut peer = Cholmod::new(&lower, mode)?;
+            let right = columns.clone();
+            Some(Contender {
+                name: format!("peer: CHOLMOD {mode:?} solve, f64"),
+                is_yardstick: false,
+                run: Box::new(move |_| {
+                    peer.right().copy_from_slice(&right);
+                    black_box(peer.solve().expect("a factored matrix"));
+                }),
+            })
+        }));
+    }
+    solvers
+}

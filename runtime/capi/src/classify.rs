@@ -1,0 +1,133 @@
+//! From a fault to its status: one each, named alike where the fault is one of a package.
+
+use sinew_runtime::{ControlError, FrameError, OpenError};
+
+use crate::fault::Fault;
+use crate::status::SinewStatus;
+
+impl Fault {
+    pub(crate) fn status(&self) -> SinewStatus {
+        match *self {
+            Self::Null { .. } => SinewStatus::NullPointer,
+            Self::Misaligned { .. } => SinewStatus::Misaligned,
+            Self::TooShort { .. } | Self::Workspace(_) => SinewStatus::TooShort,
+            Self::TooLong { .. } => SinewStatus::TooLong,
+            Self::Overlap { .. } => SinewStatus::Overlap,
+            Self::StructSize { .. } => SinewStatus::StructSize,
+            Self::UnknownOption { .. } => SinewStatus::UnknownOption,
+            Self::WrongAbi { .. } => SinewStatus::WrongAbi,
+            Self::NotAHandle { .. } => SinewStatus::NotAHandle,
+            Self::WrongHandle { .. } => SinewStatus::WrongHandle,
+            Self::ClosedHandle { .. } => SinewStatus::ClosedHandle,
+            Self::MovedHandle { .. } => SinewStatus::MovedHandle,
+            Self::DamagedHandle { .. } => SinewStatus::DamagedHandle,
+            Self::InUse { .. } => SinewStatus::InUse,
+            Self::NoSuchName => SinewStatus::NoSuchName,
+            Self::Open(error) => open_status(error),
+            Self::Control(error) => control_status(error),
+            Self::Frame(error) => frame_status(error),
+            Self::Internal => SinewStatus::Internal,
+        }
+    }
+}
+
+fn control_status(error: ControlError) -> SinewStatus {
+    match error {
+        ControlError::NoSuchComponent { .. } => SinewStatus::NoSuchControl,
+        ControlError::NotFinite { .. } => SinewStatus::NotFinite,
+        ControlError::WrongLength { .. } => SinewStatus::TooShort,
+        _ => SinewStatus::Internal,
+    }
+}
+
+fn frame_status(error: FrameError) -> SinewStatus {
+    match error {
+        FrameError::WrongLength { .. } => SinewStatus::TooShort,
+        FrameError::ForeignWorkspace => SinewStatus::ForeignWorkspace,
+        FrameError::ForeignControls => SinewStatus::ForeignControls,
+        FrameError::NoSuchComponent { .. } => SinewStatus::NoSuchControl,
+        FrameError::FeatureNotFinite { .. } => SinewStatus::NotFinite,
+        FrameError::NotFinite { .. } => SinewStatus::FrameOverflow,
+        _ => SinewStatus::Internal,
+    }
+}
+
+fn open_status(error: OpenError) -> SinewStatus {
+    match error {
+        OpenError::TooShort { .. } => SinewStatus::PackageTooShort,
+        OpenError::WrongMagic => SinewStatus::PackageWrongMagic,
+        OpenError::HeaderCorrupt => SinewStatus::PackageHeaderCorrupt,
+        OpenError::UnsupportedVersion { .. } => SinewStatus::PackageUnsupportedVersion,
+        OpenError::ReservedNotZero => SinewStatus::PackageReservedNotZero,
+        OpenError::UnknownKind { .. } => SinewStatus::PackageUnknownKind,
+        OpenError::WrongKind { .. } => SinewStatus::PackageWrongKind,
+        OpenError::Truncated { .. } => SinewStatus::PackageTruncated,
+        OpenError::TrailingBytes { .. } => SinewStatus::PackageTrailingBytes,
+        OpenError::Misaligned { .. } => SinewStatus::PackageMisaligned,
+        OpenError::PayloadCorrupt { .. } => SinewStatus::PackagePayloadCorrupt,
+        OpenError::ContentIdMismatch => SinewStatus::PackageContentIdMismatch,
+        OpenError::Malformed => SinewStatus::PackageMalformed,
+        OpenError::NotFinite { .. } => SinewStatus::PackageNotFinite,
+        OpenError::OutOfRange { .. } => SinewStatus::PackageOutOfRange,
+        OpenError::NotPositive { .. } => SinewStatus::PackageNotPositive,
+        OpenError::PivotNotPositive { .. } => SinewStatus::PackagePivotNotPositive,
+        OpenError::IndexOutOfRange { .. } => SinewStatus::PackageIndexOutOfRange,
+        OpenError::CountMismatch { .. } => SinewStatus::PackageCountMismatch,
+        OpenError::TooFew { .. } => SinewStatus::PackageTooFew,
+        OpenError::TooMany { .. } => SinewStatus::PackageTooMany,
+        OpenError::NotAscending { .. } => SinewStatus::PackageNotAscending,
+        OpenError::ParentAfterChild { .. } => SinewStatus::PackageParentAfterChild,
+        OpenError::NotContiguous { .. } => SinewStatus::PackageNotContiguous,
+        OpenError::NotAPermutation { .. } => SinewStatus::PackageNotAPermutation,
+        OpenError::NotSymmetric { .. } => SinewStatus::PackageNotSymmetric,
+        OpenError::BitmapTail { .. } => SinewStatus::PackageBitmapTail,
+        OpenError::RangeWithoutZero { .. } => SinewStatus::PackageRangeWithoutZero,
+        OpenError::NameInvalid { .. } => SinewStatus::PackageNameInvalid,
+        OpenError::NameDuplicate { .. } => SinewStatus::PackageNameDuplicate,
+        _ => SinewStatus::Internal,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::path::Path;
+
+    /// The errors may grow, and the compiler does not say so; each must get a status of its own.
+    #[test]
+    fn every_error_of_the_crates_below_has_a_status() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let own = include_str!("classify.rs");
+        for (file, name) in [
+            ("formats/src/package/error.rs", "OpenError"),
+            ("runtime/src/error.rs", "ControlError"),
+            ("runtime/src/error.rs", "FrameError"),
+        ] {
+            let source = fs::read_to_string(root.join(file)).expect("the source is there");
+            let (_, body) = source
+                .split_once(&format!("pub enum {name} {{"))
+                .expect("the enum is there");
+            let (body, _) = body.split_once("\n}").expect("the enum ends");
+            let variants = body
+                .lines()
+                .filter_map(|line| line.strip_prefix("    "))
+                .filter(|line| line.starts_with(char::is_uppercase))
+                .map(|line| line.trim_end_matches([' ', '{', ',']));
+            let mut count = 0;
+            for variant in variants {
+                count += 1;
+                let arm = format!("{name}::{variant}");
+                let right = match name {
+                    "OpenError" => format!("=> SinewStatus::Package{variant},"),
+                    _ => "=> SinewStatus::".to_owned(),
+                };
+                let has = |pattern: String| own.contains(&format!("{pattern} {right}"));
+                assert!(
+                    has(arm.clone()) || has(format!("{arm} {{ .. }}")),
+                    "{arm} has no status"
+                );
+            }
+            assert!(count > 2, "{name} was read");
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! The frame: checks all memory of the call, then runs the runtime's own frame on it.
+
+use sinew_runtime::{Controls, Frame, FrameError, FrameOutcome};
+
+use crate::basis::{SinewBasis, share_basis};
+use crate::controls::{SinewControls, lend_controls};
+use crate::details::SinewDetails;
+use crate::edge::edge_with_details;
+use crate::fault::Fault;
+use crate::handle::{Handle, Lent};
+use crate::memory::{Access, Regions, array};
+use crate::status::SinewStatus;
+use crate::structs::{self, GrowingStruct, StructOut};
+use crate::workspace::{SinewWorkspace, WorkspaceBody};
+
+/// Where a frame writes. Start from zeros (`SinewFrameOptions options = {0};`), then set `struct_bytes` and what you
+/// want: zero means "not wanted" or "as usual" for every member, also for those that later versions add.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct SinewFrameOptions {
+    /// `sizeof(SinewFrameOptions)`.
+    pub struct_bytes: usize,
+    /// Takes the deformed positions, xyz for each vertex, source order, units of the source. Not NULL.
+    pub positions: *mut f32,
+    /// Floats that `positions` has room for: at least 3 V; more stay untouched.
+    pub position_floats: usize,
+    /// Takes unit vertex normals, xyz for each vertex, source order. NULL where not wanted.
+    pub normals: *mut f32,
+    /// Floats that `normals` has room for: at least 3 V; more stay untouched.
+    pub normal_floats: usize,
+}
+
+// SAFETY: `repr(C)`, the size first, no padding, raw pointers and integers only.
+unsafe impl GrowingStruct for SinewFrameOptions {
+    const NAME: &'static str = "options";
+    const FIRST_BYTES: usize = size_of::<Self>();
+}
+
+/// What a frame had to do.
+#[repr(i32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SinewFrameOutcome {
+    /// The controls had moved: decoded and solved.
+    Solved = 1,
+    /// The controls were those of the workspace's last frame: its solution was written out again.
+    Unchanged = 2,
+}
+
+/// What a frame tells besides its buffers. Set `struct_bytes` to `sizeof(SinewFrameReport)` before the call.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct SinewFrameReport {
+    /// `sizeof(SinewFrameReport)`.
+    pub struct_bytes: usize,
+    /// What the frame had to do.
+    pub outcome: SinewFrameOutcome,
+}
+
+// SAFETY: `repr(C)`, the size first. It is only written, never read.
+unsafe impl GrowingStruct for SinewFrameReport {
+    const NAME: &'static str = "report";
+    const FIRST_BYTES: usize = size_of::<Self>();
+}
+
+/// Plays one frame: the rest shape deformed by the controls.
+///
+/// `basis`, `workspace`, `controls`: made for the same content. Positions, normals, options, report, details, package and
+/// the memory of the handles must not overlap.
+/// `options`: where to write.
+/// `report`: NULL, or takes what the frame had to do.
+/// `details`: NULL, or takes the numbers behind a refusal.
+///
+/// Allocates nothing and waits for nothing. Components at rest are skipped; where no control moved since the workspace's last
+/// frame, only the outputs are written.
+///
+/// Errors: those of a handle; `FOREIGN_WORKSPACE`, `FOREIGN_CONTROLS`, `TOO_SHORT`, `TOO_LONG`, `OVERLAP`,
+/// `STRUCT_SIZE`, `UNKNOWN_OPTION`, `NOT_FINITE` (something wrote over the weights), `FRAME_OVERFLOW` (then positions and
+/// normals are those of the rest shape).
+/// Threads: any number at a time for one basis; one at a time for each workspace and each controls handle, and another
+/// one's use at this moment is noticed.
+///
+/// # Safety
+/// The handles are NULL or handles of their kind; the others are NULL or point to memory of the stated lengths.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_frame(
+    basis: *const SinewBasis,
+    workspace: *mut SinewWorkspace,
+    controls: *const SinewControls,
+    options: *const SinewFrameOptions,
+    report: *mut SinewFrameReport,
+    details: *mut SinewDetails,
+) -> SinewStatus {
+    let play = |regions: &mut Regions| {
+        // SAFETY: the caller's promise for each of them.
+        let (basis, mut workspace, mut controls, report, options) = unsafe {
+            let basis = share_basis(basis, regions)?;
+            let workspace: Lent<'_, WorkspaceBody> = Handle::lend(workspace.cast(), regions)?;
+            let controls = lend_controls(controls, regions)?;
+            let report = StructOut::optional(report, regions)?;
+            (basis, workspace, controls, report, structs::read(options, regions)?)
+        };
+        let basis = &basis.basis;
+        if controls.basis_id != basis.id() {
+            return Err(Fault::Frame(FrameError::ForeignControls));
+        }
+        let vertex_count = basis.vertex_count();
+        // SAFETY: the caller's promise.
+        let (positions, normals) = unsafe {
+            let room = options.position_floats;
+            let positions = vectors(options.positions, room, vertex_count, "positions", regions)?;
+            let normals = match options.normals.is_null() {
+                true => None,
+                false => Some(vectors(
+                    options.normals,
+                    options.normal_floats,
+                    vertex_count,
+                    "normals",
+                    regions,
+                )?),
+            };
+            (positions, normals)
+        };
+        let controls = Controls::resume(basis, &mut *controls.weights)?;
+        let job = Frame {
+            basis,
+            controls: &controls,
+            positions,
+            normals,
+        };
+        let outcome = match job.run(&mut workspace.workspace)? {
+            FrameOutcome::Solved => SinewFrameOutcome::Solved,
+            FrameOutcome::Unchanged => SinewFrameOutcome::Unchanged,
+        };
+        report.write(&SinewFrameReport {
+            struct_bytes: size_of::<SinewFrameReport>(),
+            outcome,
+        });
+        Ok(())
+    };
+    // SAFETY: the caller's promise.
+    unsafe { edge_with_details(details, play) }
+}
+
+/// A caller's output of one vector a vertex.
+///
+/// # Safety
+/// `floats` is null or writable for `room` floats.
+unsafe fn vectors<'b>(
+    floats: *mut f32,
+    room: usize,
+    vertex_count: usize,
+    name: &'static str,
+    regions: &mut Regions,
+) -> Result<&'b mut [[f32; 3]], Fault> {
+    array(floats, room, 3 * vertex_count, name, Access::Write, regions)?;
+    // SAFETY: the caller's promise; checked, and apart from all that was added to the regions.
+    Ok(unsafe { core::slice::from_raw_parts_mut(floats.cast(), vertex_count) })
+}

@@ -1,0 +1,109 @@
+//! Structs that may grow: the first member is the struct's size as the caller's header knew it, so either side may be
+//! the newer one.
+//!
+//! A caller's input struct may be longer than this library knows, as long as the rest is zero, which means "default"; an
+//! output struct is filled as far as the shorter of the two goes.
+
+use core::mem::MaybeUninit;
+
+use crate::fault::Fault;
+use crate::memory::{Access, Region, Regions, present};
+
+/// No struct is longer; a larger size is garbage.
+const STRUCT_BYTES_MAX: usize = 4096;
+
+/// # Safety
+/// `repr(C)`, first member `struct_bytes: usize`, no drop, and valid for any bits, those of its padding included.
+pub(crate) unsafe trait GrowingStruct: Copy {
+    const NAME: &'static str;
+    /// Size in the first version that had this struct: the least that is accepted.
+    const FIRST_BYTES: usize;
+}
+
+/// Checks pointer and size. Returns the size the caller gives.
+///
+/// # Safety
+/// `pointer` is null or points to a readable struct that starts with its own size.
+unsafe fn size<T: GrowingStruct>(pointer: *const T) -> Result<usize, Fault> {
+    present(pointer, T::NAME)?;
+    // SAFETY: not null, aligned, and the size is its first member.
+    let actual = unsafe { pointer.cast::<usize>().read() };
+    if (T::FIRST_BYTES..=STRUCT_BYTES_MAX).contains(&actual) && actual.is_multiple_of(align_of::<usize>()) {
+        Ok(actual)
+    } else {
+        Err(Fault::StructSize {
+            name: T::NAME,
+            expected: size_of::<T>(),
+            actual,
+        })
+    }
+}
+
+/// Reads an input struct; members that the caller's version lacks are zero.
+///
+/// # Safety
+/// `pointer` is null or points to a readable struct that starts with its own size.
+pub(crate) unsafe fn read<T: GrowingStruct>(pointer: *const T, regions: &mut Regions) -> Result<T, Fault> {
+    // SAFETY: the caller's promise.
+    let bytes = unsafe { size(pointer)? };
+    regions.add(Region::new(pointer, bytes, T::NAME, Access::Read)?)?;
+    let known = bytes.min(size_of::<T>());
+    for at in known..bytes {
+        // SAFETY: within the size that the struct gives itself.
+        if unsafe { pointer.cast::<u8>().add(at).read() } != 0 {
+            return Err(Fault::UnknownOption { name: T::NAME, at });
+        }
+    }
+    let mut value = MaybeUninit::<T>::zeroed();
+    // SAFETY: both sides are at least `known` bytes; every bit pattern is a value.
+    unsafe {
+        pointer
+            .cast::<u8>()
+            .copy_to_nonoverlapping(value.as_mut_ptr().cast(), known);
+        Ok(value.assume_init())
+    }
+}
+
+/// An output struct, checked, to be written at most once.
+pub(crate) struct StructOut<T> {
+    pointer: *mut T,
+    bytes: usize,
+}
+
+impl<T: GrowingStruct> StructOut<T> {
+    /// Null means that the caller does not want it.
+    ///
+    /// # Safety
+    /// `pointer` is null or points to a writable struct that starts with its own size.
+    pub(crate) unsafe fn optional(pointer: *mut T, regions: &mut Regions) -> Result<Self, Fault> {
+        if pointer.is_null() {
+            return Ok(Self { pointer, bytes: 0 });
+        }
+        // SAFETY: the caller's promise.
+        unsafe { Self::required(pointer, regions) }
+    }
+
+    /// # Safety
+    /// As for `optional`; null is refused.
+    pub(crate) unsafe fn required(pointer: *mut T, regions: &mut Regions) -> Result<Self, Fault> {
+        // SAFETY: the caller's promise.
+        let bytes = unsafe { size(pointer.cast_const())? };
+        regions.add(Region::new(pointer, bytes, T::NAME, Access::Write)?)?;
+        Ok(Self { pointer, bytes })
+    }
+
+    /// Writes all but the size, which stays what the caller gave.
+    pub(crate) fn write(&self, value: &T) {
+        const SIZE_BYTES: usize = size_of::<usize>();
+        if self.pointer.is_null() {
+            return;
+        }
+        let known = self.bytes.min(size_of::<T>());
+        let (from, to) = ((&raw const *value).cast::<u8>(), self.pointer.cast::<u8>());
+        // SAFETY: `required` proved that the struct is that long; the value is another object.
+        unsafe {
+            from.add(SIZE_BYTES)
+                .copy_to_nonoverlapping(to.add(SIZE_BYTES), known - SIZE_BYTES);
+        }
+    }
+}

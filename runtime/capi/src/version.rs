@@ -1,0 +1,28 @@
+//! Versions: of the library, for people; of the interface, for the check that header and library belong together.
+
+use core::ffi::{CStr, c_char};
+
+/// Version of this interface. Rises when a function, a struct or a status code changes its meaning; additions leave it.
+pub const SINEW_ABI_VERSION: u32 = 1;
+
+const VERSION: &CStr = match CStr::from_bytes_with_nul(concat!(env!("CARGO_PKG_VERSION"), "\0").as_bytes()) {
+    Ok(version) => version,
+    Err(_) => panic!("a version has no NUL"),
+};
+
+/// The library's version, for example "0.1.0". Never NULL, never freed.
+///
+/// Threads: any.
+#[unsafe(no_mangle)]
+pub extern "C" fn sinew_version() -> *const c_char {
+    VERSION.as_ptr()
+}
+
+/// The interface version that the library was built with; `SINEW_ABI_VERSION` is that of the header. `sinew_basis_open`
+/// compares the two.
+///
+/// Threads: any.
+#[unsafe(no_mangle)]
+pub extern "C" fn sinew_abi_version() -> u32 {
+    SINEW_ABI_VERSION
+}

@@ -1,0 +1,186 @@
+//! C programs, compiled as users compile them (C99, every warning an error), linked with either library, run plainly and
+//! under valgrind where this machine has it.
+
+mod common;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use common::{Output, compact_package, compile, crate_folder, libraries, other_package, package, run, tool};
+use sinew_runtime::{Basis, Controls, Frame, Workspace, WorkspaceLayout};
+use tempfile::TempDir;
+
+/// What valgrind ends with when it found anything.
+const VALGRIND_ERROR: &str = "99";
+
+/// `misuse.c` compares whole memories, so it also looks at the padding inside of handles, which nobody sets.
+const SUPPRESSION: &str = "{\n padding\n Memcheck:Cond\n fun:*cmp*\n fun:say\n}\n";
+
+struct Folder(TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        for (name, bytes) in [
+            ("baked.sinew", package()),
+            ("other.sinew", other_package()),
+            ("compact.sinew", compact_package()),
+        ] {
+            fs::write(folder.path().join(name), &*bytes).expect("written");
+        }
+        fs::write(folder.path().join("suppression"), SUPPRESSION).expect("written");
+        Self(folder)
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// The program of a source in this crate, linked with a library.
+    fn program(&self, source: &str, library: &Path) -> PathBuf {
+        let run_path = format!("-Wl,-rpath,{}", library.parent().expect("in a folder").display());
+        compile(
+            "gcc",
+            &["-std=c99", &run_path],
+            &crate_folder().join(source),
+            &[library],
+            self.0.path(),
+        )
+    }
+}
+
+/// Runs a program; under valgrind too, which must find nothing and see the same.
+fn run_twice(program: &Path, arguments: &[PathBuf]) -> Output {
+    let folder = program.parent().expect("in a folder");
+    let plain = run(Command::new(program).args(arguments));
+    if let Some(valgrind) = tool("valgrind") {
+        let checked = run(Command::new(valgrind)
+            .args([
+                "--quiet",
+                "--leak-check=full",
+                "--show-leak-kinds=all",
+                "--errors-for-leak-kinds=all",
+            ])
+            .arg(format!("--error-exitcode={VALGRIND_ERROR}"))
+            .arg(format!("--suppressions={}", folder.join("suppression").display()))
+            .arg(program)
+            .args(arguments));
+        assert_eq!(checked.code, plain.code, "{}", checked.stderr);
+        assert_eq!(checked.stdout, plain.stdout);
+    }
+    plain
+}
+
+/// The pose that the example plays when it is given no controls: positions and normals. Shape: `[V]`.
+fn expected_pose(bytes: &[u8]) -> [Vec<[f32; 3]>; 2] {
+    let basis = Basis::open(bytes).expect("valid");
+    let mut memory = vec![0; WorkspaceLayout::for_basis(&basis).unaligned_bytes()];
+    let mut workspace = Workspace::new(&basis, &mut memory).expect("enough");
+    let mut weights = vec![0.0; basis.component_count()];
+    let mut controls = Controls::new(&basis, &mut weights).expect("one weight a component");
+    for k in 0..2 {
+        controls.set(k, 0.5 * basis.component(k).maximum).expect("finite");
+    }
+    let mut positions = vec![[0.0; 3]; basis.vertex_count()];
+    let mut normals = positions.clone();
+    let job = Frame {
+        basis: &basis,
+        controls: &controls,
+        positions: &mut positions,
+        normals: Some(&mut normals),
+    };
+    job.run(&mut workspace).expect("finite");
+    [positions, normals]
+}
+
+/// Vectors of an OBJ's lines that begin with a word.
+fn vectors(obj: &str, word: &str) -> Vec<[f32; 3]> {
+    obj.lines()
+        .filter_map(|line| line.strip_prefix(word)?.strip_prefix(' '))
+        .map(|rest| {
+            let mut numbers = rest.split(' ').map(|number| number.parse().expect("a number"));
+            core::array::from_fn(|_| numbers.next().expect("three numbers"))
+        })
+        .collect()
+}
+
+fn check_example(library: &Path) {
+    let folder = Folder::new();
+    let program = folder.program("examples/pose.c", library);
+    let obj = folder.file("pose.obj");
+    let output = run_twice(&program, &[folder.file("baked.sinew"), obj.clone()]);
+    assert_eq!(output.code, Some(0), "{}", output.stderr);
+    let written = fs::read_to_string(&obj).expect("the example wrote it");
+    let [positions, normals] = expected_pose(&package());
+    assert_eq!(
+        vectors(&written, "v"),
+        positions,
+        "the runtime's own positions, to the bit"
+    );
+    assert_eq!(vectors(&written, "vn"), normals);
+    let face_count = Basis::open(&package()).expect("valid").face_count();
+    assert_eq!(
+        written.lines().filter(|line| line.starts_with("f ")).count(),
+        face_count
+    );
+
+    let refused = run(Command::new(&program).args([folder.file("compact.sinew"), obj.clone()]));
+    assert_eq!(refused.code, Some(1));
+    assert!(refused.stderr.contains("run `sinew bake` on it"), "{}", refused.stderr);
+    let refused = run(Command::new(&program).args([folder.file("baked.sinew"), obj, "no=1".into()]));
+    assert_eq!(refused.code, Some(1));
+    assert!(refused.stderr.contains("no control of this name"), "{}", refused.stderr);
+}
+
+#[test]
+fn the_example_plays_the_runtime_s_pose_linked_statically() {
+    check_example(&libraries().archive);
+}
+
+#[test]
+fn the_example_plays_the_runtime_s_pose_linked_dynamically() {
+    check_example(&libraries().shared);
+}
+
+#[test]
+fn every_misuse_is_refused_by_name_and_changes_nothing() {
+    let folder = Folder::new();
+    let program = folder.program("tests/misuse.c", &libraries().archive);
+    let packages = ["baked.sinew", "other.sinew", "compact.sinew"].map(|name| folder.file(name));
+    let output = run_twice(&program, &packages);
+    let expected_file = crate_folder().join("tests/misuse.txt");
+    if std::env::var_os("UPDATE_MISUSE").is_some() {
+        fs::write(&expected_file, &output.stdout).expect("written");
+        panic!("misuse.txt was written; read the changes, then run the test again without UPDATE_MISUSE");
+    }
+    let expected = fs::read_to_string(&expected_file).expect("the expected lines are there");
+    for (number, (line, expected)) in output.stdout.lines().zip(expected.lines()).enumerate() {
+        assert_eq!(line, expected, "line {}", number + 1);
+    }
+    assert_eq!(output.stdout.lines().count(), expected.lines().count());
+    assert_eq!(output.code, Some(0), "{}", output.stderr);
+}
+
+/// What no single-threaded C program can bring about, or only with a resealed package.
+const NOT_IN_MISUSE: [&str; 2] = ["SINEW_STATUS_IN_USE", "SINEW_STATUS_INTERNAL"];
+
+#[test]
+fn the_misuses_show_every_status_that_is_not_of_a_package() {
+    let shown = fs::read_to_string(crate_folder().join("tests/misuse.txt")).expect("the expected lines are there");
+    let header = fs::read_to_string(crate_folder().join("include/sinew.h")).expect("the header is there");
+    let statuses = header
+        .lines()
+        .filter_map(|line| line.trim().split_once(" = "))
+        .map(|(name, _)| name)
+        .filter(|name| name.starts_with("SINEW_STATUS_") && !name.contains("_PACKAGE_"));
+    let mut count = 0;
+    for status in statuses.filter(|name| !NOT_IN_MISUSE.contains(name)) {
+        count += 1;
+        assert!(
+            shown.lines().any(|line| line.ends_with(status)),
+            "{status} is not shown"
+        );
+    }
+    assert!(count > 15);
+}

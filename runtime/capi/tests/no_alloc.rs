@@ -1,0 +1,175 @@
+//! Opening, creating, setting and playing through the C functions allocate nothing, refusals included: counted by the
+//! allocator.
+
+mod common;
+
+use core::alloc::{GlobalAlloc, Layout};
+use core::cell::Cell;
+use core::ptr::{null, null_mut};
+use std::alloc::System;
+
+use common::player::{Memory, Player, sized};
+use common::{other_package, package};
+use sinew::*;
+
+thread_local! {
+    /// Requests of this thread. The test harness allocates on others.
+    static REQUESTS: Cell<u64> = const { Cell::new(0) };
+}
+
+struct Counting;
+
+// SAFETY: every request goes to the system's allocator unchanged; counting touches a thread's own cell without heap.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        REQUESTS.set(REQUESTS.get() + 1);
+        // SAFETY: the caller's promise, passed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        REQUESTS.set(REQUESTS.get() + 1);
+        // SAFETY: the caller's promise, passed on.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, new_bytes: usize) -> *mut u8 {
+        REQUESTS.set(REQUESTS.get() + 1);
+        // SAFETY: the caller's promise, passed on.
+        unsafe { System.realloc(pointer, layout, new_bytes) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// Runs `work` and returns how often it went to the allocator.
+fn requests(work: impl FnOnce()) -> u64 {
+    let before = REQUESTS.get();
+    work();
+    REQUESTS.get() - before
+}
+
+#[test]
+fn the_counter_counts() {
+    assert_eq!(requests(|| drop(core::hint::black_box(Box::new(1)))), 2);
+    assert_eq!(requests(|| ()), 0);
+}
+
+#[test]
+fn a_thousand_frames_allocate_nothing() {
+    let bytes = package();
+    let mut player = Player::new(&bytes).expect("valid");
+    let mut solved = 0;
+    let count = requests(|| {
+        for frame in 0..1000_u32 {
+            let (k, weight) = (frame % player.control_count, (frame as f32 * 0.1).sin());
+            // Every third frame changes nothing.
+            if frame % 3 != 0 {
+                // SAFETY: the player's memory stands.
+                let status = unsafe { sinew_control_set(player.controls, k, weight, null_mut()) };
+                assert_eq!(status, SinewStatus::Ok);
+            }
+            solved += u32::from(player.frame() == Ok(SinewFrameOutcome::Solved));
+        }
+    });
+    assert_eq!(count, 0);
+    assert!(solved > 500, "{solved} frames had something to do");
+}
+
+#[test]
+fn opening_creating_asking_and_closing_allocate_nothing() {
+    let (bytes, mut damaged) = (package(), package());
+    damaged.as_mut_slice()[100] ^= 1;
+    let mut player = Player::new(&bytes).expect("valid");
+    let [basis_memory, workspace_memory, controls_memory] = player.memory();
+    let memory = [basis_memory, workspace_memory, controls_memory].map(|memory| (memory.pointer(), memory.bytes()));
+    let (mut basis, mut workspace, mut controls) = (null_mut(), null_mut(), null_mut());
+    let mut details = sized::<SinewDetails>();
+    let mut name = [0; SINEW_NAME_BYTES];
+    let (mut control, mut minimum, mut weights) = (7, 0.0, [0.0; 4]);
+    let count = requests(|| {
+        // SAFETY: the player's memory stands, and nobody uses its handles meanwhile.
+        unsafe {
+            let details = details.as_mut_ptr();
+            let [(at, room), ..] = memory;
+            let open = |bytes: &[u8], basis: &mut *mut SinewBasis| {
+                sinew_basis_open(SINEW_ABI_VERSION, bytes.as_ptr(), bytes.len(), at, room, basis, details)
+            };
+            assert_eq!(open(&damaged, &mut basis), SinewStatus::PackagePayloadCorrupt);
+            assert_eq!(open(&bytes, &mut basis), SinewStatus::Ok);
+            let (at, room) = memory[1];
+            assert_eq!(
+                sinew_workspace_create(basis, at, room, &mut workspace, details),
+                SinewStatus::Ok
+            );
+            let (at, room) = memory[2];
+            assert_eq!(
+                sinew_controls_create(basis, at, room, &mut controls, details),
+                SinewStatus::Ok
+            );
+            assert_eq!(
+                sinew_control_name(basis, 0, name.as_mut_ptr(), name.len()),
+                SinewStatus::Ok
+            );
+            assert_eq!(sinew_control_find(basis, name.as_ptr(), &mut control), SinewStatus::Ok);
+            assert_eq!(
+                sinew_control_range(basis, control, &mut minimum, null_mut()),
+                SinewStatus::Ok
+            );
+            assert_eq!(
+                sinew_control_set(controls, control, f32::NAN, null_mut()),
+                SinewStatus::NotFinite
+            );
+            assert_eq!(
+                sinew_controls_get_all(controls, weights.as_mut_ptr(), 4),
+                SinewStatus::Ok
+            );
+            assert_eq!(
+                sinew_controls_set_all(controls, weights.as_ptr(), 4, details),
+                SinewStatus::Ok
+            );
+            let played = sinew_frame(basis, workspace, controls, null(), null_mut(), details);
+            assert_eq!(played, SinewStatus::NullPointer);
+            assert_eq!(sinew_controls_close(controls), SinewStatus::Ok);
+            assert_eq!(sinew_workspace_close(workspace), SinewStatus::Ok);
+            assert_eq!(sinew_basis_close(basis), SinewStatus::Ok);
+        }
+    });
+    assert_eq!(count, 0);
+    assert_eq!(control, 0);
+}
+
+#[test]
+fn frames_that_overflow_allocate_nothing() {
+    let bytes = other_package();
+    let mut player = Player::new(&bytes).expect("valid");
+    let count = requests(|| {
+        for k in 0..player.control_count {
+            // SAFETY: the player's memory stands.
+            let status = unsafe { sinew_control_set_unclamped(player.controls, k, f32::MAX) };
+            assert_eq!(status, SinewStatus::Ok);
+        }
+        assert_eq!(player.frame(), Err(SinewStatus::FrameOverflow));
+    });
+    assert_eq!(count, 0);
+}
+
+#[test]
+fn memory_beyond_a_layout_stays_untouched() {
+    let bytes = package();
+    let mut player = Player::new(&bytes).expect("valid");
+    let size_bytes = player.memory()[1].bytes();
+    let mut memory = Memory::new(size_bytes + 640);
+    let (at, room) = (memory.pointer(), memory.bytes());
+    let mut workspace = null_mut();
+    // SAFETY: the memory stands.
+    let tail = unsafe {
+        let status = sinew_workspace_create(player.basis, at, room, &mut workspace, null_mut());
+        assert_eq!(status, SinewStatus::Ok);
+        player.workspace = workspace;
+        assert!(player.frame().is_ok());
+        core::slice::from_raw_parts(at.add(size_bytes), 640)
+    };
+    assert!(tail.iter().all(|&byte| byte == 0xaa));
+}
