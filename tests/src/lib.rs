@@ -13,9 +13,11 @@ pub fn compact_package() -> AlignedBytes {
     write_compact(&tiny_compact().basis()).expect("the hand-made package obeys the rules")
 }
 
-/// The bytes of [`tiny_baked`], baked by hand from [`tiny_compact`].
+/// The bytes of [`tiny_baked`], baked by hand from [`tiny_compact`], with a fast tier.
 pub fn baked_package() -> AlignedBytes {
-    write_baked(&tiny_baked().basis()).expect("the hand-made package obeys the rules")
+    let mut baked = tiny_baked();
+    baked.fast = Some(baked.own_nodes());
+    write_baked(&baked.basis()).expect("the hand-made package obeys the rules")
 }
 
 /// One frame from rest, with memory of its own. `weight` gives each component's weight, before it is clamped.

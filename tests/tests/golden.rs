@@ -70,13 +70,15 @@ fn describe_baked(view: &BakedView<'_>) -> String {
     view.components().for_each(|component| line("component", &component));
     line("fan_offsets", &view.fan_offsets());
     line("fans", &view.fans());
-    for (name, tier) in [
-        ("exact", Some(view.exact())),
-        ("fast", view.fast().map(|fast| fast.nodes())),
-    ] {
-        if let Some(tier) = tier {
-            describe_tier(&tier, &mut |field, value| line(&format!("{name}.{field}"), value));
-        }
+    describe_tier(&view.exact(), &mut |field, value| line(&format!("exact.{field}"), value));
+    if let Some(fast) = view.fast() {
+        describe_tier(&fast.nodes(), &mut |field, value| {
+            line(&format!("fast.nodes.{field}"), value);
+        });
+        line("fast.centre", &fast.centre());
+        line("fast.skin_nodes", &fast.skin_nodes());
+        line("fast.skin_weights", &fast.skin_weights());
+        line("fast.error", &fast.error());
     }
     text
 }
