@@ -165,10 +165,10 @@ fn other_targets_lock_the_versions_of_the_workspace() {
             "{folder}: the lock file was read"
         );
         for name in RUNTIME_CLOSURE {
-            if let Some(version) = outside.get(name) {
+            if let Some(version) = outside.get(*name) {
                 assert_eq!(
                     Some(version),
-                    workspace.get(name),
+                    workspace.get(*name),
                     "{folder}/Cargo.lock, {name}: copy the root's Cargo.lock there and build"
                 );
             }
