@@ -5,12 +5,15 @@ mod error;
 pub mod keys;
 mod place;
 
+use core::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
 use miette::{IntoDiagnostic, Report, WrapErr};
 use sinew_runtime::input::protocol::{Coding, MidiSettings, Pairing};
 use sinew_runtime::input::{Centre, Command, Curve, Failsafe, FullScale, Protocol, Smoothing, Takeover};
 use toml::de::DeTable;
+
+use crate::device::parse_osc;
 
 pub use error::ConfigError;
 use keys::{Fault, Found, Keys, WholeOrText, nearest};
@@ -46,8 +49,8 @@ pub struct DeviceChoice {
     pub serial: Option<Found<String>>,
     /// A MIDI port whose name contains this.
     pub midi: Option<String>,
-    /// UDP port for OSC.
-    pub osc: Option<u16>,
+    /// Where OSC is taken over UDP.
+    pub osc: Option<SocketAddr>,
     /// What it speaks, if it is not to be found out.
     pub protocol: Option<Protocol>,
     /// Baud rate of the serial port.
@@ -256,7 +259,7 @@ fn device_choice(mut keys: Keys<'_>) -> Result<DeviceChoice, Fault> {
         span: found.span,
     });
     let midi = keys.text("midi")?;
-    let osc = keys.small("osc", 1..=u16::MAX)?;
+    let osc = keys.whole_or_text("osc")?;
     let spans = [
         device.serial.as_ref().map(|found| &found.span),
         midi.as_ref().map(|found| &found.span),
@@ -269,7 +272,13 @@ fn device_choice(mut keys: Keys<'_>) -> Result<DeviceChoice, Fault> {
             .help("keep one of `serial`, `midi` and `osc`"));
     }
     device.midi = midi.map(|found| found.value.to_owned());
-    device.osc = osc.map(|found| found.value);
+    if let Some(osc) = osc {
+        let text = match osc.value {
+            WholeOrText::Whole(port) => port.to_string(),
+            WholeOrText::Text(text) => text.to_owned(),
+        };
+        device.osc = Some(parse_osc(&text).map_err(|message| Fault::new(osc.span, message))?);
+    }
     if let Some(protocol) = keys.text("protocol")?
         && protocol.value != "auto"
     {

@@ -1,5 +1,7 @@
 //! Which device: the options of a command, what `knobs.toml` says, and the two together.
 
+use core::net::{Ipv4Addr, SocketAddr};
+
 use clap::Args;
 use miette::{Report, miette};
 use sinew_runtime::input::{Clock, DeviceStatus, FullScale, Protocol, Settings};
@@ -16,9 +18,9 @@ pub struct DeviceArguments {
     /// MIDI port whose name contains this; needs a build with --features midi
     #[arg(long, value_name = "NAME", conflicts_with = "osc")]
     pub midi: Option<String>,
-    /// UDP port to take OSC on, on all interfaces
-    #[arg(long, value_name = "PORT", value_parser = clap::value_parser!(u16).range(1..))]
-    pub osc: Option<u16>,
+    /// UDP port to take OSC on, from this machine; 0.0.0.0:PORT lets others in, a tablet for one
+    #[arg(long, value_name = "PORT", value_parser = parse_osc)]
+    pub osc: Option<SocketAddr>,
     /// What the device speaks, instead of finding out: lines (deej, CSV), packets, midi, firmata, osc
     #[arg(long, value_name = "NAME", value_parser = parse_protocol)]
     pub protocol: Option<Protocol>,
@@ -35,6 +37,16 @@ fn parse_protocol(name: &str) -> Result<Protocol, String> {
         let names: Vec<_> = Protocol::ALL.iter().map(|protocol| protocol.name()).collect();
         format!("there is no protocol `{name}`: it is one of {}", names.join(", "))
     })
+}
+
+/// `9000` or `0.0.0.0:9000`.
+///
+/// # Errors
+/// What a person should write.
+pub fn parse_osc(text: &str) -> Result<SocketAddr, String> {
+    let port = text.parse().ok().map(|port: u16| SocketAddr::from((Ipv4Addr::LOCALHOST, port)));
+    let address = port.or_else(|| text.parse().ok()).filter(|address| address.port() > 0);
+    address.ok_or_else(|| format!("`{text}` is neither a port, such as 9000, nor an address with one, such as 0.0.0.0:9000"))
 }
 
 impl DeviceArguments {
@@ -72,8 +84,8 @@ pub fn open(choice: &DeviceChoice, clock: Clock, wait: bool) -> Result<Box<dyn D
     if let Some(name) = &choice.midi {
         return open_midi(name, decoding, clock, wait);
     }
-    if let Some(port) = choice.osc {
-        return open_osc(port, decoding, clock);
+    if let Some(address) = choice.osc {
+        return open_osc(address, decoding, clock);
     }
     open_serial(choice, decoding, clock, wait)
 }
@@ -97,4 +109,63 @@ fn open_serial(choice: &DeviceChoice, decoding: Settings, clock: Clock, wait: bo
 #[cfg(not(feature = "serial"))]
 fn open_serial(_: &DeviceChoice, _: Settings, _: Clock, _: bool) -> Result<Box<dyn Device>, Report> {
     Err(miette!("this build reads no serial ports: build it with --features serial"))
+}
+
+#[cfg(feature = "midi")]
+fn open_midi(name: &str, decoding: Settings, clock: Clock, wait: bool) -> Result<Box<dyn Device>, Report> {
+    use sinew_runtime::input::{MidiPortSettings, MidiSource};
+    let settings = MidiPortSettings {
+        decoding,
+        wait,
+        ..MidiPortSettings::default()
+    };
+    let source = MidiSource::open(name, settings, clock).map_err(|error| miette!("{error}"))?;
+    Ok(Box::new(source))
+}
+
+#[cfg(not(feature = "midi"))]
+fn open_midi(_: &str, _: Settings, _: Clock, _: bool) -> Result<Box<dyn Device>, Report> {
+    Err(miette!("this build reads no MIDI ports: build it with --features midi"))
+}
+
+#[cfg(feature = "osc")]
+fn open_osc(address: SocketAddr, decoding: Settings, clock: Clock) -> Result<Box<dyn Device>, Report> {
+    use sinew_runtime::input::{OscSettings, OscSource};
+    let settings = OscSettings {
+        address,
+        decoding,
+        ..OscSettings::default()
+    };
+    let source = OscSource::open(settings, clock).map_err(|error| miette!("{error}"))?;
+    Ok(Box::new(source))
+}
+
+#[cfg(not(feature = "osc"))]
+fn open_osc(_: SocketAddr, _: Settings, _: Clock) -> Result<Box<dyn Device>, Report> {
+    Err(miette!("this build takes no OSC: build it with --features osc"))
+}
+
+/// What a device is known by in the file of calibrations: its USB identity if it has one, so that it may move to another
+/// port, else its port.
+pub fn identity(choice: &DeviceChoice, status: &DeviceStatus) -> String {
+    if choice.midi.is_some() {
+        return format!("midi {}", status.port);
+    }
+    if choice.osc.is_some() {
+        return format!("osc {}", status.port);
+    }
+    usb_identity(&status.port).unwrap_or_else(|| format!("serial {}", status.port))
+}
+
+#[cfg(feature = "serial")]
+fn usb_identity(path: &str) -> Option<String> {
+    let ports = sinew_runtime::input::serial_ports().ok()?;
+    let usb = ports.into_iter().find(|port| port.path == path)?.usb?;
+    let number = usb.serial_number.map_or(String::new(), |number| format!(" {number}"));
+    Some(format!("usb {:04x}:{:04x}{number}", usb.vendor_id, usb.product_id))
+}
+
+#[cfg(not(feature = "serial"))]
+fn usb_identity(_: &str) -> Option<String> {
+    None
 }

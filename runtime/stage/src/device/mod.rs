@@ -6,7 +6,7 @@ mod listen;
 
 use sinew_runtime::input::{ControlSource, DeviceStatus};
 
-pub use choice::{DeviceArguments, identity, open};
+pub use choice::{DeviceArguments, identity, open, parse_osc};
 pub use listen::listen;
 
 /// A source that can tell people about itself.
