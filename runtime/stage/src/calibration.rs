@@ -165,7 +165,7 @@ fn parse(text: &str) -> Result<Calibrations, Fault> {
 }
 
 fn read_knob(mut keys: Keys<'_>) -> Result<CalibratedKnob, Fault> {
-    let mut steps = |keys: &mut Keys<'_>, key: &'static str| keys.small(key, 0..=u16::MAX).map(|found| found.map(|f| f.value));
+    let steps = |keys: &mut Keys<'_>, key: &'static str| keys.small(key, 0..=u16::MAX).map(|found| found.map(|f| f.value));
     let span = keys.span.clone();
     let needed = |value: Option<u16>, key: &str| {
         value.ok_or_else(|| Fault::new(span.clone(), format!("[[device.knob]] has no `{key}`")))

@@ -32,6 +32,12 @@ impl WeightsChecksum {
     }
 }
 
+impl core::fmt::Debug for WeightsChecksum {
+    fn fmt(&self, out: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(out, "WeightsChecksum({self})")
+    }
+}
+
 /// `120 frames, weights checksum 0123456789abcdef`.
 impl core::fmt::Display for WeightsChecksum {
     fn fmt(&self, out: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {

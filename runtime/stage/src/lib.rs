@@ -5,11 +5,13 @@
 
 pub mod calibration;
 pub mod checksum;
+pub mod commands;
 pub mod config;
 pub mod device;
 pub mod export;
 pub mod model;
 pub mod pace;
+pub mod play;
 pub mod snapshot;
 pub mod stream;
 pub mod view;

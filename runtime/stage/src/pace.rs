@@ -38,11 +38,6 @@ impl Pace {
         self.due_us += self.frame_us;
     }
 
-    /// Sleeps until the clock reads `at_us`.
-    pub fn wait_until(&self, at_us: u64) {
-        thread::sleep(Duration::from_micros(at_us.saturating_sub(self.clock.now_us())));
-    }
-
     /// Frames that were left out.
     pub fn missed(&self) -> u64 {
         self.missed

@@ -20,6 +20,11 @@ pub enum StreamSpec {
 }
 
 impl StreamSpec {
+    /// Whether it ends in files, which may take a replay faster than it was played. A pipe may be looked at.
+    pub fn is_file(&self) -> bool {
+        matches!(self, Self::Obj(_) | Self::ObjFolder(_) | Self::Raw(Some(_)))
+    }
+
     /// Whether it sends positions.
     pub fn wants_positions(&self) -> bool {
         !matches!(self, Self::UdpWeights(_))
