@@ -10,7 +10,7 @@ use sinew_runtime::input::{
 };
 
 use crate::config::Place;
-pub use resolve::resolve;
+pub use resolve::{resolve, unknown_component};
 pub use split::split;
 
 /// A knob heard while the program started.

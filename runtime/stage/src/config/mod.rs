@@ -17,7 +17,7 @@ use crate::device::parse_osc;
 
 pub use error::ConfigError;
 use keys::{Fault, Found, Keys, WholeOrText, nearest};
-pub use place::Place;
+pub use place::{Place, midi_words};
 
 /// A mapping file, without a package to hold it against.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -46,6 +46,19 @@ impl core::fmt::Display for Place {
     }
 }
 
+/// How a file names the MIDI knob of an address: the inverse of what [`Place::of`] reads.
+pub fn midi_words(address: u16) -> String {
+    let (kind, rest) = match address {
+        KNOB_NOTE.. => ("note", address - KNOB_NOTE),
+        KNOB_PITCH_BEND.. => return format!("bend channel {}", address - KNOB_PITCH_BEND + 1),
+        _ => ("cc", address),
+    };
+    match rest / 128 {
+        0 => format!("{kind} {}", rest % 128),
+        channel => format!("{kind} {} channel {}", rest % 128, channel + 1),
+    }
+}
+
 /// `cc 21`, `cc 21 channel 2`, `bend channel 1`, `note 36`; channels from 1, and 1 if left out. `None`: not meant as MIDI.
 fn midi_address(text: &str) -> Option<Result<u16, String>> {
     let mut words = text.split_whitespace();
@@ -89,6 +102,9 @@ mod tests {
         assert_eq!(text("bend"), Ok(Place::Number(2048)));
         assert_eq!(text("bend channel 16"), Ok(Place::Number(2063)));
         assert_eq!(text("note 36 channel 10"), Ok(Place::Number(2064 + 9 * 128 + 36)));
+        for address in 0..KNOB_NOTE + 2048 {
+            assert_eq!(text(&midi_words(address)), Ok(Place::Number(address)));
+        }
         for wrong in ["cc", "cc 128", "cc 1 channel 0", "cc 1 channel 17", "note x", "bend 3"] {
             assert!(text(wrong).unwrap_err().contains(wrong), "{wrong}");
         }

@@ -3,11 +3,13 @@
 
 mod choice;
 mod listen;
+mod touch;
 
 use sinew_runtime::input::{ControlSource, DeviceStatus};
 
 pub use choice::{DeviceArguments, identity, open, parse_osc};
 pub use listen::listen;
+pub use touch::Touch;
 
 /// A source that can tell people about itself.
 pub trait Device: ControlSource {
