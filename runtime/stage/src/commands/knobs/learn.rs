@@ -14,7 +14,8 @@ use sinew_runtime::input::{DeviceStatus, Protocol};
 use super::{Listener, knob_words, protocol};
 use crate::calibration::quoted;
 use crate::commands::{Failure, catch_interrupts, interrupted, parse_duration, read_choice};
-use crate::config::{COMMANDS, KnobsFile, midi_words};
+use crate::config::keys::WholeOrText;
+use crate::config::{COMMANDS, KnobsFile, Place, midi_words};
 use crate::device::{DeviceArguments, Touch};
 use crate::model;
 use crate::wiring::{resolve, unknown_component};
@@ -100,7 +101,9 @@ pub fn run(arguments: &LearnArguments, quiet: bool) -> Result<(), Failure> {
                     Answer::Done => break,
                 }
                 // What was turned while the question stood is no answer to the next.
-                listener.step(|_, event| drop(touch.event(event)));
+                listener.step(|_, event| {
+                    let _ = touch.event(event);
+                });
                 touch.settle();
                 eprintln!("turn the next knob");
             }
@@ -196,7 +199,10 @@ fn mapping(package: &Path, device: &DeviceArguments, status: &DeviceStatus, lear
         let _ = write!(text, "\n[device]\n{}\n", chosen.join("\n"));
     }
     for (knob, given) in learned {
-        let name = status.names.iter().find(|named| named.knob == *knob).map(|named| quoted(&named.name));
+        let named = status.names.iter().find(|named| named.knob == *knob).map(|named| named.name.as_str());
+        // A device may call a knob "cc 21", which a file reads as a MIDI message.
+        let is_name = |name: &&str| matches!(Place::of(WholeOrText::Text(name)), Ok(Place::Name(_)));
+        let name = named.filter(is_name).map(quoted);
         let midi = (protocol(status) == Some(Protocol::Midi)).then(|| quoted(&midi_words(*knob)));
         let place = name.or(midi).unwrap_or_else(|| knob.to_string());
         let _ = match given {
