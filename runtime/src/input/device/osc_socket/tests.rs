@@ -68,7 +68,7 @@ fn messages_and_bundles_of_another_library_move_knobs() {
     let status = source.device_status();
     let names: vec::Vec<_> = status.names.iter().map(|name| name.name.as_str()).collect();
     assert_eq!(names, ["/jaw", "/brow"]);
-    assert_eq!((status.link, status.port), (Link::Open, source.address().to_string()));
+    assert_eq!((status.link, &status.port), (Link::Open, &source.address().to_string()));
     assert!(status.last_fault().is_some());
 }
 
