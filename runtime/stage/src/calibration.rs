@@ -37,7 +37,11 @@ pub struct DeviceCalibration {
 impl DeviceCalibration {
     /// Of a knob: by its name if it has one, because names outlive a change of order, else by its address.
     pub fn of(&self, address: Option<u16>, name: Option<&str>) -> Option<KnobCalibration> {
-        let by_name = |name: &str| self.knobs.iter().find(|knob| !knob.name.is_empty() && knob.name == name);
+        let by_name = |name: &str| {
+            self.knobs
+                .iter()
+                .find(|knob| !knob.name.is_empty() && knob.name == name)
+        };
         let by_address = |address: u16| self.knobs.iter().find(|knob| knob.address == address);
         let found = name.and_then(by_name).or_else(|| address.and_then(by_address));
         found.map(|knob| knob.calibration)
@@ -56,7 +60,11 @@ pub struct Calibrations {
 /// # Errors
 /// The system names no such folder.
 pub fn default_path() -> Result<PathBuf, Report> {
-    let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    let set = |name: &str| {
+        std::env::var_os(name)
+            .filter(|value| !value.is_empty())
+            .map(PathBuf::from)
+    };
     let folder = if cfg!(windows) {
         set("APPDATA")
     } else if cfg!(target_os = "macos") {
@@ -64,7 +72,8 @@ pub fn default_path() -> Result<PathBuf, Report> {
     } else {
         set("XDG_CONFIG_HOME").or_else(|| set("HOME").map(|home| home.join(".config")))
     };
-    let folder = folder.ok_or_else(|| miette::miette!("no folder for settings is known here: name a file with --calibration"))?;
+    let folder = folder
+        .ok_or_else(|| miette::miette!("no folder for settings is known here: name a file with --calibration"))?;
     Ok(folder.join("sinew").join("calibration.toml"))
 }
 
@@ -125,8 +134,17 @@ impl Calibrations {
                 if !knob.name.is_empty() {
                     let _ = writeln!(text, "name = {}", quoted(&knob.name));
                 }
-                let KnobCalibration { full_scale, lowest, highest, centre, noise } = knob.calibration;
-                let _ = writeln!(text, "full_scale = {full_scale}\nlowest = {lowest}\nhighest = {highest}");
+                let KnobCalibration {
+                    full_scale,
+                    lowest,
+                    highest,
+                    centre,
+                    noise,
+                } = knob.calibration;
+                let _ = writeln!(
+                    text,
+                    "full_scale = {full_scale}\nlowest = {lowest}\nhighest = {highest}"
+                );
                 if let Some(centre) = centre {
                     let _ = writeln!(text, "centre = {centre}");
                 }
@@ -147,7 +165,9 @@ fn parse(text: &str) -> Result<Calibrations, Fault> {
     let mut keys = Keys::new(&table, 0..0, "the file");
     let mut devices = Vec::new();
     for mut device in keys.tables("device", "[[device]]")? {
-        let id = device.text("id")?.ok_or_else(|| Fault::new(device.span.clone(), "[[device]] has no `id`"))?;
+        let id = device
+            .text("id")?
+            .ok_or_else(|| Fault::new(device.span.clone(), "[[device]] has no `id`"))?;
         let follow_supply = device.flag("follow_supply")?.unwrap_or(false);
         let mut knobs = Vec::new();
         for knob in device.tables("knob", "[[device.knob]]")? {
@@ -165,7 +185,8 @@ fn parse(text: &str) -> Result<Calibrations, Fault> {
 }
 
 fn read_knob(mut keys: Keys<'_>) -> Result<CalibratedKnob, Fault> {
-    let steps = |keys: &mut Keys<'_>, key: &'static str| keys.small(key, 0..=u16::MAX).map(|found| found.map(|f| f.value));
+    let steps =
+        |keys: &mut Keys<'_>, key: &'static str| keys.small(key, 0..=u16::MAX).map(|found| found.map(|f| f.value));
     let span = keys.span.clone();
     let needed = |value: Option<u16>, key: &str| {
         value.ok_or_else(|| Fault::new(span.clone(), format!("[[device.knob]] has no `{key}`")))
@@ -184,18 +205,35 @@ fn read_knob(mut keys: Keys<'_>) -> Result<CalibratedKnob, Fault> {
         return Err(Fault::new(span, "these numbers leave no range to turn in")
             .help("measure the knob again with `sinew-stage knobs calibrate`"));
     }
-    Ok(CalibratedKnob { address, name, calibration })
+    Ok(CalibratedKnob {
+        address,
+        name,
+        calibration,
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const POT: KnobCalibration = KnobCalibration { full_scale: 1023, lowest: 7, highest: 1010, centre: None, noise: 3 };
+    const POT: KnobCalibration = KnobCalibration {
+        full_scale: 1023,
+        lowest: 7,
+        highest: 1010,
+        centre: None,
+        noise: 3,
+    };
 
     fn device(id: &str) -> DeviceCalibration {
-        let knob = |address, name: &str, calibration| CalibratedKnob { address, name: name.to_owned(), calibration };
-        let centred = KnobCalibration { centre: Some(500), ..POT };
+        let knob = |address, name: &str, calibration| CalibratedKnob {
+            address,
+            name: name.to_owned(),
+            calibration,
+        };
+        let centred = KnobCalibration {
+            centre: Some(500),
+            ..POT
+        };
         DeviceCalibration {
             device: id.to_owned(),
             follow_supply: true,
@@ -227,7 +265,11 @@ mod tests {
 
     #[test]
     fn a_calibration_without_a_range_is_refused_with_its_place() {
-        let text = Calibrations { devices: vec![device("x")] }.text().replace("highest = 1010", "highest = 9");
+        let text = Calibrations {
+            devices: vec![device("x")],
+        }
+        .text()
+        .replace("highest = 1010", "highest = 9");
         let error = Calibrations::parse(Path::new("c.toml"), &text).unwrap_err();
         assert_eq!(error.to_string(), "c.toml:7:1: these numbers leave no range to turn in");
     }

@@ -41,7 +41,12 @@ impl core::fmt::Debug for WeightsChecksum {
 /// `120 frames, weights checksum 0123456789abcdef`.
 impl core::fmt::Display for WeightsChecksum {
     fn fmt(&self, out: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(out, "{} frames, weights checksum {:016x}", self.frames, self.hash.digest())
+        write!(
+            out,
+            "{} frames, weights checksum {:016x}",
+            self.frames,
+            self.hash.digest()
+        )
     }
 }
 

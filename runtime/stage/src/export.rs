@@ -55,9 +55,13 @@ impl WeightsTable {
     pub fn finish(&self) -> Result<usize, Report> {
         let refuse = || format!("the weights are not written to {}", self.path.display());
         if self.csv {
-            save_package(&self.path, self.text().as_bytes()).into_diagnostic().wrap_err_with(refuse)?;
+            save_package(&self.path, self.text().as_bytes())
+                .into_diagnostic()
+                .wrap_err_with(refuse)?;
         } else {
-            write_npy_matrix(&self.path, &self.weights, self.names.len()).into_diagnostic().wrap_err_with(refuse)?;
+            write_npy_matrix(&self.path, &self.weights, self.names.len())
+                .into_diagnostic()
+                .wrap_err_with(refuse)?;
         }
         Ok(self.times_us.len())
     }
@@ -98,7 +102,10 @@ mod tests {
     fn a_table_has_a_row_a_frame_and_reads_back_to_the_bit() {
         let folder = tempfile::tempdir().unwrap();
         let names = vec!["c0".to_owned(), "a,\"b\"".to_owned()];
-        let frames = [(1_000_000, [0.1_f32, -2.0]), (1_016_667, [f32::MIN_POSITIVE, 0.333_333_34])];
+        let frames = [
+            (1_000_000, [0.1_f32, -2.0]),
+            (1_016_667, [f32::MIN_POSITIVE, 0.333_333_34]),
+        ];
         let csv = folder.path().join("w.csv");
         let npy = folder.path().join("w.npy");
         for path in [&csv, &npy] {
@@ -112,7 +119,11 @@ mod tests {
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines[0], "time_s,c0,\"a,\"\"b\"\"\"");
         assert_eq!(lines[1], "0.000000,0.1,-2");
-        let read: Vec<f32> = lines[2].split(',').skip(1).map(|field| field.parse().unwrap()).collect();
+        let read: Vec<f32> = lines[2]
+            .split(',')
+            .skip(1)
+            .map(|field| field.parse().unwrap())
+            .collect();
         assert_eq!(read, frames[1].1);
         assert!(lines[2].starts_with("0.016667,"));
         let bytes = std::fs::read(npy).unwrap();

@@ -57,7 +57,13 @@ pub struct Labels {
 
 impl Labels {
     /// Labels of a map; a knob without a name is called by its number.
-    pub fn new(title: String, basis: &Basis<'_>, knobs: &[Knob<'_>], page_count: u16, tree: Option<(u16, u16)>) -> Self {
+    pub fn new(
+        title: String,
+        basis: &Basis<'_>,
+        knobs: &[Knob<'_>],
+        page_count: u16,
+        tree: Option<(u16, u16)>,
+    ) -> Self {
         let own = crate::config::Place::OWN_ADDRESSES;
         let knob_label = |(n, knob): (usize, &Knob<'_>)| match (knob.name, knob.address) {
             ("", address) if address >= own => format!("knob {}", n + 1),

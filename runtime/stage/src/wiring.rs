@@ -1,8 +1,8 @@
 //! From a mapping file and the knobs found to the records of a [`ControlMap`]: names become components, places become
 //! addresses, and what a file leaves open follows the component tree.
 
-mod split;
 mod resolve;
+mod split;
 
 use sinew_runtime::Basis;
 use sinew_runtime::input::{
@@ -187,7 +187,10 @@ impl Router {
 
     /// The device's address of a knob of the map, once it was heard.
     pub fn device_address(&self, map_address: u16) -> Option<u16> {
-        self.table.iter().position(|&routed| routed == map_address).map(|address| address as u16)
+        self.table
+            .iter()
+            .position(|&routed| routed == map_address)
+            .map(|address| address as u16)
     }
 }
 

@@ -67,7 +67,11 @@ fn parse_duration(text: &str) -> Result<Duration, String> {
     let refuse = || format!("`{text}` is not a time: write for example 500ms, 90s, 5m or 1h30m");
     if let Some(milliseconds) = text.strip_suffix("ms") {
         let milliseconds: u64 = milliseconds.parse().map_err(|_| refuse())?;
-        return if milliseconds > 0 { Ok(Duration::from_millis(milliseconds)) } else { Err(refuse()) };
+        return if milliseconds > 0 {
+            Ok(Duration::from_millis(milliseconds))
+        } else {
+            Err(refuse())
+        };
     }
     let mut seconds = 0.0;
     let mut number = String::new();

@@ -114,17 +114,36 @@ fn say(quiet: bool, text: &str) {
 }
 
 fn start_streams(arguments: &PlayArguments, basis: &Basis<'_>) -> Result<Vec<Stream>, Report> {
-    let stdout = arguments.streams.iter().filter(|spec| **spec == StreamSpec::Raw(None)).count();
+    let stdout = arguments
+        .streams
+        .iter()
+        .filter(|spec| **spec == StreamSpec::Raw(None))
+        .count();
     if stdout > 1 {
-        return Err(miette!("standard output takes one raw stream: give the others a file, raw:FILE"));
+        return Err(miette!(
+            "standard output takes one raw stream: give the others a file, raw:FILE"
+        ));
     }
-    let start = |spec: &StreamSpec| Stream::start(spec.clone(), basis.vertex_count(), basis.component_count(), basis.faces());
+    let start = |spec: &StreamSpec| {
+        Stream::start(
+            spec.clone(),
+            basis.vertex_count(),
+            basis.component_count(),
+            basis.faces(),
+        )
+    };
     arguments.streams.iter().map(start).collect()
 }
 
 fn title(path: &Path, basis: &Basis<'_>) -> String {
-    let name = path.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
-    format!("{name}: {} vertices, {} components", basis.vertex_count(), basis.component_count())
+    let name = path
+        .file_name()
+        .map_or(String::new(), |name| name.to_string_lossy().into_owned());
+    format!(
+        "{name}: {} vertices, {} components",
+        basis.vertex_count(),
+        basis.component_count()
+    )
 }
 
 /// The view or the status lines, until the board is closed.
@@ -144,10 +163,14 @@ impl Watcher {
         let board = Arc::clone(board);
         if draws(arguments) {
             let started = view::start_terminal(board, labels, requests.clone());
-            let view = started.into_diagnostic().wrap_err("the terminal cannot be drawn on: try --headless")?;
+            let view = started
+                .into_diagnostic()
+                .wrap_err("the terminal cannot be drawn on: try --headless")?;
             Ok(Self::View(view))
         } else {
-            Ok(Self::Lines(view::start_status_lines(board, labels, quiet).into_diagnostic()?))
+            Ok(Self::Lines(
+                view::start_status_lines(board, labels, quiet).into_diagnostic()?,
+            ))
         }
     }
 
@@ -184,7 +207,12 @@ fn live(arguments: &PlayArguments, basis: &Basis<'_>, quiet: bool) -> Result<(),
     let (file, choice) = read_choice(arguments.knobs.as_deref(), &arguments.device)?;
     // Names and ranges are checked before anything is opened: a mistake in a file costs no three seconds.
     resolve(&file, basis, &[], None)?;
-    let mut heard = Heard { device: None, knobs: Vec::new(), name: "typed".to_owned(), identity: None };
+    let mut heard = Heard {
+        device: None,
+        knobs: Vec::new(),
+        name: "typed".to_owned(),
+        identity: None,
+    };
     let in_file = choice.serial.is_some() || choice.midi.is_some() || choice.osc.is_some();
     if arguments.device.names_one() || in_file || !arguments.typed {
         // A box that comes later is welcome; one that was asked for by name and is not there is a mistake.
@@ -194,7 +222,10 @@ fn live(arguments: &PlayArguments, basis: &Basis<'_>, quiet: bool) -> Result<(),
             say(quiet, &format!("listening to {} ...", status.port));
             heard.knobs = listen(device.as_mut(), clock, &interrupted);
         } else {
-            say(quiet, "no knob box yet: plug one in, or see `sinew-stage knobs list`; going on without");
+            say(
+                quiet,
+                "no knob box yet: plug one in, or see `sinew-stage knobs list`; going on without",
+            );
         }
         let status = device.device_status();
         heard.identity = (status.link == sinew_runtime::input::Link::Open).then(|| identity(&choice, &status));
@@ -241,7 +272,9 @@ fn live(arguments: &PlayArguments, basis: &Basis<'_>, quiet: bool) -> Result<(),
         board: Arc::clone(&board),
         interrupted: catch_interrupts(),
         fps: arguments.fps.unwrap_or(60.0),
-        until_us: arguments.time.map(|time| clock.now_us().saturating_add(time.as_micros() as u64)),
+        until_us: arguments
+            .time
+            .map(|time| clock.now_us().saturating_add(time.as_micros() as u64)),
         record: arguments.record.clone(),
         record_later: arguments.record.clone().unwrap_or_else(|| PathBuf::from("sinew.take")),
         device_name: heard.name,
@@ -255,13 +288,22 @@ fn live(arguments: &PlayArguments, basis: &Basis<'_>, quiet: bool) -> Result<(),
 fn summarize(outcome: &LiveOutcome, live: Live<'_>, quiet: bool) -> Result<(), Failure> {
     say(quiet, &format!("played {}", outcome.checksum));
     if outcome.missed > 0 {
-        say(quiet, &format!("{} frames were left out because one before them took too long", outcome.missed));
+        say(
+            quiet,
+            &format!(
+                "{} frames were left out because one before them took too long",
+                outcome.missed
+            ),
+        );
     }
     if let Some(device) = &live.device {
         let status = device.device_status();
         let counts = status.counts;
         let bad = status.counters;
-        let reason = bad.last_fault.filter(|_| bad.bad > 0).map_or(String::new(), |fault| format!(" (the last: {fault})"));
+        let reason = bad
+            .last_fault
+            .filter(|_| bad.bad > 0)
+            .map_or(String::new(), |fault| format!(" (the last: {fault})"));
         say(
             quiet,
             &format!(

@@ -228,7 +228,11 @@ impl<'a> Keys<'a> {
         let Some(value) = self.get(key) else { return Ok(None) };
         let array = value.get_ref().as_array();
         let array = array.ok_or_else(|| Self::wrong_type(key, value, "a list"))?;
-        array.iter().map(|entry| whole_or_text(key, entry)).collect::<Result<_, _>>().map(Some)
+        array
+            .iter()
+            .map(|entry| whole_or_text(key, entry))
+            .collect::<Result<_, _>>()
+            .map(Some)
     }
 
     /// A table within this one.
@@ -249,7 +253,9 @@ impl<'a> Keys<'a> {
     /// # Errors
     /// Another type.
     pub fn tables(&mut self, key: &'static str, heading: &'static str) -> Result<Vec<Keys<'a>>, Fault> {
-        let Some(value) = self.get(key) else { return Ok(Vec::new()) };
+        let Some(value) = self.get(key) else {
+            return Ok(Vec::new());
+        };
         let wrong = || Self::wrong_type(key, value, &format!("a list of tables, each headed {heading}"));
         let array = value.get_ref().as_array().ok_or_else(wrong)?;
         let tables = array.iter().map(|entry| {

@@ -268,8 +268,10 @@ fn device_choice(mut keys: Keys<'_>) -> Result<DeviceChoice, Fault> {
     let mut named: Vec<_> = spans.into_iter().flatten().collect();
     named.sort_by_key(|span| span.start);
     if let Some(second) = named.get(1) {
-        return Err(Fault::new((*second).clone(), "a second device is named: one plays at a time")
-            .help("keep one of `serial`, `midi` and `osc`"));
+        return Err(
+            Fault::new((*second).clone(), "a second device is named: one plays at a time")
+                .help("keep one of `serial`, `midi` and `osc`"),
+        );
     }
     device.midi = midi.map(|found| found.value.to_owned());
     if let Some(osc) = osc {
@@ -284,8 +286,10 @@ fn device_choice(mut keys: Keys<'_>) -> Result<DeviceChoice, Fault> {
     {
         let found = Protocol::parse_name(protocol.value).ok_or_else(|| {
             let names: Vec<_> = Protocol::ALL.iter().map(|protocol| protocol.name()).collect();
-            Fault::new(protocol.span, format!("there is no protocol \"{}\"", protocol.value))
-                .help(format!("write \"auto\" to have it found out, or one of {}", names.join(", ")))
+            Fault::new(protocol.span, format!("there is no protocol \"{}\"", protocol.value)).help(format!(
+                "write \"auto\" to have it found out, or one of {}",
+                names.join(", ")
+            ))
         })?;
         device.protocol = Some(found);
     }
@@ -361,10 +365,16 @@ fn feel(keys: &mut Keys<'_>) -> Result<Feel, Fault> {
     // A number that nothing reads would be a surprise on stage.
     let slopes = matches!(curve, Some(Curve::Exponential { .. } | Curve::Logarithmic { .. }));
     if let Some(ratio) = ratio.filter(|_| !slopes) {
-        return Err(Fault::new(ratio.span, "`ratio` needs curve = \"exponential\" or \"logarithmic\" beside it"));
+        return Err(Fault::new(
+            ratio.span,
+            "`ratio` needs curve = \"exponential\" or \"logarithmic\" beside it",
+        ));
     }
     if let Some(steepness) = steepness.filter(|_| !matches!(curve, Some(Curve::SCurve { .. }))) {
-        return Err(Fault::new(steepness.span, "`steepness` needs curve = \"s-curve\" beside it"));
+        return Err(Fault::new(
+            steepness.span,
+            "`steepness` needs curve = \"s-curve\" beside it",
+        ));
     }
     let centre = keys.word("centre", &[("rest", true), ("even", false)])?;
     let detent = keys.number("detent", 0.0..=0.5)?;
@@ -394,7 +404,9 @@ fn feel(keys: &mut Keys<'_>) -> Result<Feel, Fault> {
 }
 
 fn smoothing(keys: &mut Keys<'_>, under: Smoothing) -> Result<Option<Smoothing>, Fault> {
-    let Some(mut table) = keys.table("smoothing", "`smoothing`")? else { return Ok(None) };
+    let Some(mut table) = keys.table("smoothing", "`smoothing`")? else {
+        return Ok(None);
+    };
     let mut smoothing = under;
     if let Some(found) = table.number("minimum_cutoff_hz", 0.01..=1000.0)? {
         smoothing.minimum_cutoff_hz = found.value;
@@ -434,12 +446,18 @@ fn read_tree(mut keys: Keys<'_>) -> Result<TreeEntry, Fault> {
     let listed = keys.whole_or_text_list("knobs")?;
     let knobs = match (first, listed) {
         (Some(first), Some(_)) => {
-            return Err(Fault::new(first.span, "`first_knob` and `knobs` both say where the tree's knobs are")
-                .help("keep one of them"));
+            return Err(Fault::new(
+                first.span,
+                "`first_knob` and `knobs` both say where the tree's knobs are",
+            )
+            .help("keep one of them"));
         }
         (Some(first), None) => {
             let (Some(coarse), Some(fine)) = (coarse, fine) else {
-                return Err(Fault::new(first.span, "`first_knob` needs `coarse` and `fine` beside it"));
+                return Err(Fault::new(
+                    first.span,
+                    "`first_knob` needs `coarse` and `fine` beside it",
+                ));
             };
             let last = u32::from(first.value) + u32::from(coarse) + u32::from(fine);
             if last > u32::from(u16::MAX) {
@@ -447,7 +465,12 @@ fn read_tree(mut keys: Keys<'_>) -> Result<TreeEntry, Fault> {
             }
             let span = first.span;
             let knobs = u32::from(first.value)..last;
-            knobs.map(|address| Found { value: Place::Number(address as u16), span: span.clone() }).collect()
+            knobs
+                .map(|address| Found {
+                    value: Place::Number(address as u16),
+                    span: span.clone(),
+                })
+                .collect()
         }
         (None, Some(listed)) => listed.into_iter().map(read_place).collect::<Result<Vec<_>, _>>()?,
         (None, None) => Vec::new(),
@@ -476,7 +499,10 @@ fn read_knob(mut keys: Keys<'_>, midi: &mut MidiSettings, under: Smoothing) -> R
         }
     }
     let mut controls = Vec::new();
-    let own = keys.has("component").then(|| read_control(&mut keys, Feel::default())).transpose()?;
+    let own = keys
+        .has("component")
+        .then(|| read_control(&mut keys, Feel::default()))
+        .transpose()?;
     let common = match &own {
         Some(own) => own.feel,
         None => feel(&mut keys)?,
@@ -484,8 +510,10 @@ fn read_knob(mut keys: Keys<'_>, midi: &mut MidiSettings, under: Smoothing) -> R
     let groups = keys.tables("control", "[[knob.control]]")?;
     if let (Some(own), Some(group)) = (&own, groups.first()) {
         let _ = own;
-        return Err(Fault::new(group.span.clone(), "this knob has a `component` and a group as well")
-            .help("move the component into a [[knob.control]] of its own"));
+        return Err(
+            Fault::new(group.span.clone(), "this knob has a `component` and a group as well")
+                .help("move the component into a [[knob.control]] of its own"),
+        );
     }
     controls.extend(own);
     for mut group in groups {
@@ -510,8 +538,11 @@ fn read_control(keys: &mut Keys<'_>, under: Feel) -> Result<ControlEntry, Fault>
     let minimum = keys.number("minimum", -1e9..=1e9)?;
     let maximum = keys.number("maximum", -1e9..=1e9)?;
     if let Some(scale) = scale.as_ref().filter(|_| minimum.is_some() || maximum.is_some()) {
-        return Err(Fault::new(scale.span.clone(), "`scale` and `minimum`, `maximum` both set the range")
-            .help("keep one of them"));
+        return Err(Fault::new(
+            scale.span.clone(),
+            "`scale` and `minimum`, `maximum` both set the range",
+        )
+        .help("keep one of them"));
     }
     if let Some(scale) = scale.as_ref().filter(|scale| scale.value == 0.0) {
         return Err(Fault::new(scale.span.clone(), "a `scale` of 0 moves nothing").help("leave the control out"));
@@ -532,12 +563,11 @@ fn read_control(keys: &mut Keys<'_>, under: Feel) -> Result<ControlEntry, Fault>
 
 fn read_button(mut keys: Keys<'_>) -> Result<ButtonEntry, Fault> {
     let place = place(&mut keys, "[[button]]")?;
-    let mut words: Vec<(&'static str, Option<Command>)> = COMMANDS.map(|(word, command)| (word, Some(command))).to_vec();
+    let mut words: Vec<(&'static str, Option<Command>)> =
+        COMMANDS.map(|(word, command)| (word, Some(command))).to_vec();
     words.extend([("focus", None), ("page", None)]);
     let Some(command) = keys.word("command", &words)? else {
-        return Err(Fault::new(keys.span, "[[button]] has no `command`").help(
-            "add for example command = \"stop\"",
-        ));
+        return Err(Fault::new(keys.span, "[[button]] has no `command`").help("add for example command = \"stop\""));
     };
     let component = keys.text("component")?;
     let page = keys.small("page", 1..=u16::MAX)?;
@@ -551,7 +581,10 @@ fn read_button(mut keys: Keys<'_>) -> Result<ButtonEntry, Fault> {
         }),
         (None, None, Some(page)) => ButtonCommand::Page(page),
         _ => {
-            return Err(Fault::new(span, "command = \"focus\" needs a `component` beside it, \"page\" a `page`, and the others neither"));
+            return Err(Fault::new(
+                span,
+                "command = \"focus\" needs a `component` beside it, \"page\" a `page`, and the others neither",
+            ));
         }
     };
     Ok(ButtonEntry { place, command })

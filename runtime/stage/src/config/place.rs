@@ -23,7 +23,10 @@ impl Place {
             // The last addresses are the program's own.
             WholeOrText::Whole(number) => match u16::try_from(number) {
                 Ok(address) if address < Self::OWN_ADDRESSES => Ok(Self::Number(address)),
-                _ => Err(format!("there is no knob {number}: addresses go from 0 to {}", Self::OWN_ADDRESSES - 1)),
+                _ => Err(format!(
+                    "there is no knob {number}: addresses go from 0 to {}",
+                    Self::OWN_ADDRESSES - 1
+                )),
             },
             WholeOrText::Text(text) => match midi_address(text) {
                 Some(address) => address.map(Self::Number),

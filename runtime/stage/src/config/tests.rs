@@ -22,7 +22,13 @@ fn refused(text: &str) -> String {
 #[test]
 fn nothing_said_is_the_default() {
     let file = parse("").unwrap();
-    assert_eq!(file, KnobsFile { path: "knobs.toml".into(), ..KnobsFile::default() });
+    assert_eq!(
+        file,
+        KnobsFile {
+            path: "knobs.toml".into(),
+            ..KnobsFile::default()
+        }
+    );
 }
 
 #[test]
@@ -39,7 +45,10 @@ fn the_documented_example_says_what_it_claims() {
     let tree = file.tree.unwrap();
     assert_eq!((tree.coarse, tree.fine, tree.knobs.len()), (Some(3), Some(5), 8));
     assert_eq!(file.knobs.len(), 3);
-    assert_eq!(file.knobs[0].controls[0].feel.curve, Some(Curve::SCurve { steepness: 2.5 }));
+    assert_eq!(
+        file.knobs[0].controls[0].feel.curve,
+        Some(Curve::SCurve { steepness: 2.5 })
+    );
     assert_eq!(file.knobs[1].controls[1].scale, Some(-0.5));
     assert_eq!(file.knobs[1].controls[1].feel.takeover, Some(Takeover::Scale));
     assert_eq!(file.knobs[2].controls[1].page, Some(2));
@@ -54,7 +63,9 @@ fn the_example_shows_every_key() {
     let mut count = 0;
     for (at, start) in keys {
         let call = &source[at + start.len()..];
-        let Some((method, rest)) = call.split_once("(\"") else { continue };
+        let Some((method, rest)) = call.split_once("(\"") else {
+            continue;
+        };
         if method.chars().any(|c| !c.is_alphanumeric() && c != '_') {
             continue;
         }
@@ -156,13 +167,18 @@ fn numbers_that_nothing_reads_are_refused() {
 
 #[test]
 fn what_is_missing_is_said_at_its_heading() {
-    assert!(refused("[[knob]]\ncomponent = \"c0\"").starts_with("knobs.toml:1:1: [[knob]] does not say which knob it is"));
+    assert!(
+        refused("[[knob]]\ncomponent = \"c0\"").starts_with("knobs.toml:1:1: [[knob]] does not say which knob it is")
+    );
     assert!(refused("\n[[button]]\nknob = 3").starts_with("knobs.toml:2:1: [[button]] has no `command`"));
     assert_eq!(
         refused("[[button]]\nknob = 3\ncommand = \"page\""),
         "knobs.toml:1:1: command = \"focus\" needs a `component` beside it, \"page\" a `page`, and the others neither"
     );
-    assert!(refused("knob = 3").starts_with("knobs.toml:1:8: `knob` must be a list of tables, each headed [[knob]], not integer"));
+    assert!(
+        refused("knob = 3")
+            .starts_with("knobs.toml:1:8: `knob` must be a list of tables, each headed [[knob]], not integer")
+    );
 }
 
 #[test]
@@ -183,7 +199,14 @@ fn what_a_report_shows_points_into_the_file() {
 
 #[test]
 fn hostile_texts_are_refused_and_do_not_panic() {
-    for text in ["\u{0}", "[[[", "a.b.c.d = {", "knob = [[1]]", "[[knob]]\nknob = 99999999999999999999", "[tree]\nknobs = [1.5]"] {
+    for text in [
+        "\u{0}",
+        "[[[",
+        "a.b.c.d = {",
+        "knob = [[1]]",
+        "[[knob]]\nknob = 99999999999999999999",
+        "[tree]\nknobs = [1.5]",
+    ] {
         refused(text);
     }
     let deep = format!("[device]\nx = {}", "[".repeat(10_000));

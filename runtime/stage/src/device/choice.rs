@@ -44,9 +44,14 @@ fn parse_protocol(name: &str) -> Result<Protocol, String> {
 /// # Errors
 /// What a person should write.
 pub fn parse_osc(text: &str) -> Result<SocketAddr, String> {
-    let port = text.parse().ok().map(|port: u16| SocketAddr::from((Ipv4Addr::LOCALHOST, port)));
+    let port = text
+        .parse()
+        .ok()
+        .map(|port: u16| SocketAddr::from((Ipv4Addr::LOCALHOST, port)));
     let address = port.or_else(|| text.parse().ok()).filter(|address| address.port() > 0);
-    address.ok_or_else(|| format!("`{text}` is neither a port, such as 9000, nor an address with one, such as 0.0.0.0:9000"))
+    address.ok_or_else(|| {
+        format!("`{text}` is neither a port, such as 9000, nor an address with one, such as 0.0.0.0:9000")
+    })
 }
 
 impl DeviceArguments {
@@ -59,7 +64,10 @@ impl DeviceArguments {
     pub fn over(&self, file: &DeviceChoice) -> DeviceChoice {
         let mut choice = file.clone();
         if self.names_one() {
-            choice.serial = self.serial.clone().map(|value| crate::config::keys::Found { value, span: 0..0 });
+            choice.serial = self
+                .serial
+                .clone()
+                .map(|value| crate::config::keys::Found { value, span: 0..0 });
             choice.midi = self.midi.clone();
             choice.osc = self.osc;
         }
@@ -93,7 +101,10 @@ pub fn open(choice: &DeviceChoice, clock: Clock, wait: bool) -> Result<Box<dyn D
 #[cfg(feature = "serial")]
 fn open_serial(choice: &DeviceChoice, decoding: Settings, clock: Clock, wait: bool) -> Result<Box<dyn Device>, Report> {
     use sinew_runtime::input::{SerialSelector, SerialSettings, SerialSource};
-    let selector = choice.serial.as_ref().map_or(Ok(SerialSelector::Auto), |serial| serial.value.parse());
+    let selector = choice
+        .serial
+        .as_ref()
+        .map_or(Ok(SerialSelector::Auto), |serial| serial.value.parse());
     let Ok(selector) = selector;
     let settings = SerialSettings {
         protocol: choice.protocol,
@@ -108,7 +119,9 @@ fn open_serial(choice: &DeviceChoice, decoding: Settings, clock: Clock, wait: bo
 
 #[cfg(not(feature = "serial"))]
 fn open_serial(_: &DeviceChoice, _: Settings, _: Clock, _: bool) -> Result<Box<dyn Device>, Report> {
-    Err(miette!("this build reads no serial ports: build it with --features serial"))
+    Err(miette!(
+        "this build reads no serial ports: build it with --features serial"
+    ))
 }
 
 #[cfg(feature = "midi")]

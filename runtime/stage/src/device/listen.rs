@@ -35,6 +35,17 @@ pub fn listen(device: &mut dyn Device, clock: Clock, stop: &dyn Fn() -> bool) ->
     }
     addresses.sort_unstable();
     let names = device.device_status().names;
-    let name_of = |address| names.iter().find(|named| named.knob == address).map(|named| named.name.clone());
-    addresses.into_iter().map(|address| HeardKnob { address, name: name_of(address) }).collect()
+    let name_of = |address| {
+        names
+            .iter()
+            .find(|named| named.knob == address)
+            .map(|named| named.name.clone())
+    };
+    addresses
+        .into_iter()
+        .map(|address| HeardKnob {
+            address,
+            name: name_of(address),
+        })
+        .collect()
 }

@@ -19,7 +19,10 @@ pub trait Device: ControlSource {
     /// What it calls a knob.
     fn knob_name(&self, knob: u16) -> Option<String> {
         let names = self.device_status().names;
-        names.into_iter().find(|named| named.knob == knob).map(|named| named.name)
+        names
+            .into_iter()
+            .find(|named| named.knob == knob)
+            .map(|named| named.name)
     }
 }
 

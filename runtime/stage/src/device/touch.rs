@@ -29,11 +29,20 @@ impl Touch {
             Reading::Position { value, full_scale } => Some(f32::from(value) / f32::from(full_scale.max(1))),
             Reading::Steps(_) => None,
         };
-        let index = self.stands.iter().position(|stand| stand.knob == event.knob).unwrap_or_else(|| {
-            let start = position.unwrap_or(0.0);
-            self.stands.push(Stand { knob: event.knob, start, latest: start, steps: 0 });
-            self.stands.len() - 1
-        });
+        let index = self
+            .stands
+            .iter()
+            .position(|stand| stand.knob == event.knob)
+            .unwrap_or_else(|| {
+                let start = position.unwrap_or(0.0);
+                self.stands.push(Stand {
+                    knob: event.knob,
+                    start,
+                    latest: start,
+                    steps: 0,
+                });
+                self.stands.len() - 1
+            });
         let stand = &mut self.stands[index];
         match (event.reading, position) {
             (Reading::Steps(steps), _) => stand.steps += i32::from(steps),
@@ -60,7 +69,13 @@ mod tests {
     use super::*;
 
     fn at(knob: u16, value: u16) -> KnobEvent {
-        KnobEvent { knob, reading: Reading::Position { value, full_scale: 1023 } }
+        KnobEvent {
+            knob,
+            reading: Reading::Position {
+                value,
+                full_scale: 1023,
+            },
+        }
     }
 
     #[test]
@@ -73,7 +88,10 @@ mod tests {
         let found: Vec<u16> = (0..60).filter_map(|n| touch.event(at(1, 900 - 3 * n))).collect();
         assert_eq!(found, [1], "a longer turn is a second one");
         assert_eq!(touch.event(at(0, 503)), None);
-        let step = KnobEvent { knob: 7, reading: Reading::Steps(-2) };
+        let step = KnobEvent {
+            knob: 7,
+            reading: Reading::Steps(-2),
+        };
         assert_eq!((touch.event(step), touch.event(step)), (None, Some(7)));
     }
 }

@@ -9,8 +9,8 @@ use crossbeam::channel::Receiver;
 use miette::{IntoDiagnostic, Report, WrapErr};
 use sinew_runtime::Basis;
 use sinew_runtime::input::{
-    Clock, Command, ControlMap, ControlSurface, KnobEvent, KnobState, Reading, SlotState, SourceEvent,
-    SurfaceLayout, SurfaceSettings, TreeView,
+    Clock, Command, ControlMap, ControlSurface, KnobEvent, KnobState, Reading, SlotState, SourceEvent, SurfaceLayout,
+    SurfaceSettings, TreeView,
 };
 use sinew_runtime::take::{Record, TakeWriter};
 
@@ -101,7 +101,10 @@ impl Carried {
 
     fn note(&mut self, event: SourceEvent) {
         match event {
-            SourceEvent::Knob(KnobEvent { knob, reading: reading @ Reading::Position { .. } }) => {
+            SourceEvent::Knob(KnobEvent {
+                knob,
+                reading: reading @ Reading::Position { .. },
+            }) => {
                 if let Some((_, last)) = self.readings.iter_mut().find(|(address, _)| *address == knob) {
                     *last = Some(reading);
                 }
@@ -272,7 +275,9 @@ impl<S: FnMut(&[u8])> Segment<'_, '_, '_, '_, '_, S> {
                 return Ok(end);
             }
             self.device_events(now_us, events);
-            self.surface.advance(now_us, &mut self.scene.controls).into_diagnostic()?;
+            self.surface
+                .advance(now_us, &mut self.scene.controls)
+                .into_diagnostic()?;
             self.record(now_us, Record::Frame);
             self.checksum.frame(self.scene.controls.weights());
             self.whole.frame(self.scene.controls.weights());
@@ -280,7 +285,13 @@ impl<S: FnMut(&[u8])> Segment<'_, '_, '_, '_, '_, S> {
             let solved = self.scene.solve();
             let frame = self.whole.frames();
             for stream in &mut self.live.streams {
-                stream.offer(frame, now_us, &self.scene.positions, self.scene.controls.weights(), false);
+                stream.offer(
+                    frame,
+                    now_us,
+                    &self.scene.positions,
+                    self.scene.controls.weights(),
+                    false,
+                );
             }
             let trouble = solved.err().map(|error| error.to_string());
             self.show(now_us, pace.missed(), trouble);

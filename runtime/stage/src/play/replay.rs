@@ -55,14 +55,19 @@ impl<'t> TakeParts<'t> {
         let mut buttons = Vec::new();
         for button in take.buttons(basis) {
             match button {
-                Ok(Button { command: Command::Page(page), .. }) if page >= page_count => {}
+                Ok(Button {
+                    command: Command::Page(page),
+                    ..
+                }) if page >= page_count => {}
                 Ok(button) => buttons.push(button),
                 Err(error) => lack(error.name),
             }
         }
         // A tree moves every component, whatever is bound.
         if take.tree().is_some() {
-            take.component_names().filter(|name| basis.component_named(name).is_none()).for_each(lack);
+            take.component_names()
+                .filter(|name| basis.component_named(name).is_none())
+                .for_each(lack);
         }
         Self {
             knobs: take.knobs().collect(),
@@ -111,7 +116,12 @@ impl Replay<'_> {
     ///
     /// # Errors
     /// A map that does not fit the package; weights that overflow.
-    pub fn run(&mut self, take: &Take<'_>, map: &ControlMap<'_>, scene: &mut Scene<'_>) -> Result<ReplayOutcome, Report> {
+    pub fn run(
+        &mut self,
+        take: &Take<'_>,
+        map: &ControlMap<'_>,
+        scene: &mut Scene<'_>,
+    ) -> Result<ReplayOutcome, Report> {
         let layout = SurfaceLayout::for_map(map);
         let mut knobs = vec![KnobState::default(); layout.knob_count];
         let mut slots = vec![SlotState::default(); layout.slot_count];
@@ -137,10 +147,19 @@ impl Replay<'_> {
             if let Some(table) = &mut self.table {
                 table.frame(at_us, scene.controls.weights());
             }
-            scene.solve().into_diagnostic().wrap_err("a frame of the take cannot be played")?;
+            scene
+                .solve()
+                .into_diagnostic()
+                .wrap_err("a frame of the take cannot be played")?;
             for stream in &mut self.streams {
                 let wait = !self.paced;
-                stream.offer(outcome.checksum.frames(), at_us, &scene.positions, scene.controls.weights(), wait);
+                stream.offer(
+                    outcome.checksum.frames(),
+                    at_us,
+                    &scene.positions,
+                    scene.controls.weights(),
+                    wait,
+                );
             }
             let now_us = self.clock.now_us();
             rates.frame(now_us, now_us - before_us, surface.status().events, &self.board);
@@ -158,7 +177,9 @@ impl Replay<'_> {
     /// frame is tomorrow.
     fn wait(&self, due_us: u64) -> bool {
         loop {
-            if self.interrupted.load(Ordering::SeqCst) || self.requests.try_iter().any(|request| request == Request::Quit) {
+            if self.interrupted.load(Ordering::SeqCst)
+                || self.requests.try_iter().any(|request| request == Request::Quit)
+            {
                 return false;
             }
             let left_us = due_us.saturating_sub(self.clock.now_us());

@@ -54,7 +54,9 @@ impl TakeFile {
                 ));
             }
             Err(error) => {
-                return Err(error).into_diagnostic().wrap_err_with(|| format!("cannot record to {}", path.display()));
+                return Err(error)
+                    .into_diagnostic()
+                    .wrap_err_with(|| format!("cannot record to {}", path.display()));
             }
         };
         let (give_back, empty) = bounded(CHUNKS);
@@ -98,7 +100,9 @@ impl TakeFile {
     /// Why nothing more is written.
     pub fn fault(&self) -> Option<String> {
         let fault = self.fault.lock().unwrap_or_else(PoisonError::into_inner);
-        fault.as_ref().map(|fault| format!("the take {} is cut: {fault}", self.path.display()))
+        fault
+            .as_ref()
+            .map(|fault| format!("the take {} is cut: {fault}", self.path.display()))
     }
 
     /// The file.
@@ -135,13 +139,20 @@ impl Drop for TakeFile {
 
 /// The first name of a row that is free: `show.take`, `show-2.take`, `show-3.take`.
 pub fn free_name(wanted: &Path) -> PathBuf {
-    let stem = wanted.file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
-    let extension = wanted.extension().map_or(String::new(), |extension| format!(".{}", extension.to_string_lossy()));
+    let stem = wanted
+        .file_stem()
+        .map_or(String::new(), |stem| stem.to_string_lossy().into_owned());
+    let extension = wanted
+        .extension()
+        .map_or(String::new(), |extension| format!(".{}", extension.to_string_lossy()));
     let names = (1_u32..).map(|n| match n {
         1 => wanted.to_path_buf(),
         n => wanted.with_file_name(format!("{stem}-{n}{extension}")),
     });
-    names.into_iter().find(|path| !path.exists()).unwrap_or_else(|| wanted.to_path_buf())
+    names
+        .into_iter()
+        .find(|path| !path.exists())
+        .unwrap_or_else(|| wanted.to_path_buf())
 }
 
 #[cfg(test)]
@@ -175,7 +186,13 @@ mod tests {
         let (full, filled) = bounded::<Vec<u8>>(1);
         drop(filled);
         let fault = Arc::new(Mutex::new(Some("no space".to_owned())));
-        let file = TakeFile { path, empty, full: Some(full), thread: None, fault };
+        let file = TakeFile {
+            path,
+            empty,
+            full: Some(full),
+            thread: None,
+            fault,
+        };
         file.append(b"lost");
         assert!(file.finish().unwrap_err().to_string().contains("is cut: no space"));
     }

@@ -21,10 +21,12 @@ pub fn parse_line(line: &str, names: &[String]) -> Result<Option<Request>, Strin
     let component = |name: &str| {
         let found = names.iter().position(|known| known == name);
         // The format of packages allows 4,096 components.
-        found.map(|k| k as u16).ok_or_else(|| match nearest(name, names.iter().map(String::as_str)) {
-            Some(near) => format!("there is no component or command `{name}`; did you mean `{near}`?"),
-            None => format!("there is no component or command `{name}`"),
-        })
+        found
+            .map(|k| k as u16)
+            .ok_or_else(|| match nearest(name, names.iter().map(String::as_str)) {
+                Some(near) => format!("there is no component or command `{name}`; did you mean `{near}`?"),
+                None => format!("there is no component or command `{name}`"),
+            })
     };
     let request = match words.as_slice() {
         [] => return Ok(None),
@@ -51,7 +53,12 @@ pub fn parse_line(line: &str, names: &[String]) -> Result<Option<Request>, Strin
             }
             Request::Weight { control, weight }
         }
-        _ => return Err(format!("`{}` has too many words; write NAME WEIGHT or a command", line.trim())),
+        _ => {
+            return Err(format!(
+                "`{}` has too many words; write NAME WEIGHT or a command",
+                line.trim()
+            ));
+        }
     };
     Ok(Some(request))
 }
@@ -76,7 +83,10 @@ pub fn start_typed_lines(basis: &Basis<'_>, requests: Sender<Request>) -> std::i
             }
         }
     };
-    thread::Builder::new().name("sinew-typed".to_owned()).spawn(read).map(drop)
+    thread::Builder::new()
+        .name("sinew-typed".to_owned())
+        .spawn(read)
+        .map(drop)
 }
 
 #[cfg(test)]
@@ -87,8 +97,20 @@ mod tests {
     fn lines_are_weights_or_commands() {
         let names = ["c0", "c0.1", "jaw"].map(str::to_owned);
         let parse = |line: &str| parse_line(line, &names);
-        assert_eq!(parse(" c0.1 -0.5 # half"), Ok(Some(Request::Weight { control: 1, weight: -0.5 })));
-        assert_eq!(parse("jaw=1e-3"), Ok(Some(Request::Weight { control: 2, weight: 1e-3 })));
+        assert_eq!(
+            parse(" c0.1 -0.5 # half"),
+            Ok(Some(Request::Weight {
+                control: 1,
+                weight: -0.5
+            }))
+        );
+        assert_eq!(
+            parse("jaw=1e-3"),
+            Ok(Some(Request::Weight {
+                control: 2,
+                weight: 1e-3
+            }))
+        );
         assert_eq!(parse("next-fine"), Ok(Some(Request::Command(Command::NextFine))));
         assert_eq!(parse("focus jaw"), Ok(Some(Request::Command(Command::Focus(2)))));
         assert_eq!(parse("page 2"), Ok(Some(Request::Command(Command::Page(1)))));

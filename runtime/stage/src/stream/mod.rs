@@ -60,7 +60,12 @@ impl Stream {
     ///
     /// # Errors
     /// The target cannot be opened.
-    pub fn start(spec: StreamSpec, vertex_count: usize, component_count: usize, faces: &[[u32; 3]]) -> Result<Self, Report> {
+    pub fn start(
+        spec: StreamSpec,
+        vertex_count: usize,
+        component_count: usize,
+        faces: &[[u32; 3]],
+    ) -> Result<Self, Report> {
         let mut sink = Sink::open(&spec, vertex_count, faces)?;
         let (give_back, empty) = bounded(BUFFERS);
         let (full, filled) = bounded::<Shape>(BUFFERS);
@@ -101,7 +106,11 @@ impl Stream {
 
     /// Hands a frame over, or leaves it out if the thread is behind. With `wait` none is left out.
     pub fn offer(&mut self, frame: u64, at_us: u64, positions: &[[f32; 3]], weights: &[f32], wait: bool) {
-        let buffer = if wait { self.empty.recv().ok() } else { self.empty.try_recv().ok() };
+        let buffer = if wait {
+            self.empty.recv().ok()
+        } else {
+            self.empty.try_recv().ok()
+        };
         let (Some(mut shape), Some(full)) = (buffer, &self.full) else {
             self.dropped += 1;
             return;

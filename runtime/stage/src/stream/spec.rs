@@ -47,7 +47,11 @@ impl FromStr for StreamSpec {
             "obj" => {
                 let path = target.unwrap_or("sinew-stage.obj");
                 let folder = path.ends_with(['/', std::path::MAIN_SEPARATOR]) || PathBuf::from(path).is_dir();
-                Ok(if folder { Self::ObjFolder(path.into()) } else { Self::Obj(path.into()) })
+                Ok(if folder {
+                    Self::ObjFolder(path.into())
+                } else {
+                    Self::Obj(path.into())
+                })
             }
             "raw" => Ok(Self::Raw(target.filter(|target| *target != "-").map(PathBuf::from))),
             "udp" => port().map(Self::Udp),

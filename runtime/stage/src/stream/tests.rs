@@ -95,7 +95,11 @@ fn datagrams_put_together_are_the_frame() {
 
 #[test]
 fn weights_go_alone_and_nobody_need_listen() {
-    let port = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap().local_addr().unwrap().port();
+    let port = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))
+        .unwrap()
+        .local_addr()
+        .unwrap()
+        .port();
     let summary = play(StreamSpec::UdpWeights(port), 50);
     assert_eq!((summary.sent, summary.fault), (50, None), "the port is closed");
 }
@@ -110,7 +114,10 @@ fn a_slow_target_costs_the_stream_frames_and_a_broken_one_is_said() {
         stream.offer(n, n, &shape(n), &[0.0; 2], false);
     }
     let summary = stream.finish();
-    assert!(summary.dropped > 0 && summary.sent + summary.dropped == 1000, "{summary:?}");
+    assert!(
+        summary.dropped > 0 && summary.sent + summary.dropped == 1000,
+        "{summary:?}"
+    );
     assert!(summary.to_string().contains("ended early"), "{summary}");
     assert!(Stream::start(StreamSpec::Obj(folder.path().join("no/live.obj")), 4, 2, &FACES).is_err());
 }

@@ -35,33 +35,56 @@ impl Sink {
         let refuse = || format!("cannot stream to {spec}");
         Ok(match spec {
             StreamSpec::Obj(path) => {
-                let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+                let folder = path
+                    .parent()
+                    .filter(|folder| !folder.as_os_str().is_empty())
+                    .unwrap_or(Path::new("."));
                 if !folder.is_dir() {
                     return Err(miette::miette!("there is no folder {}", folder.display())).wrap_err_with(refuse);
                 }
-                Self::Obj { path: path.clone(), faces: faces.to_vec() }
+                Self::Obj {
+                    path: path.clone(),
+                    faces: faces.to_vec(),
+                }
             }
             StreamSpec::ObjFolder(folder) => {
-                std::fs::create_dir_all(folder).into_diagnostic().wrap_err_with(refuse)?;
-                Self::ObjFolder { folder: folder.clone(), faces: faces.to_vec() }
+                std::fs::create_dir_all(folder)
+                    .into_diagnostic()
+                    .wrap_err_with(refuse)?;
+                Self::ObjFolder {
+                    folder: folder.clone(),
+                    faces: faces.to_vec(),
+                }
             }
             StreamSpec::Raw(target) => {
                 let mut out: Box<dyn Write + Send> = match target {
                     None => Box::new(BufWriter::new(io::stdout())),
-                    Some(path) => Box::new(BufWriter::new(File::create(path).into_diagnostic().wrap_err_with(refuse)?)),
+                    Some(path) => Box::new(BufWriter::new(
+                        File::create(path).into_diagnostic().wrap_err_with(refuse)?,
+                    )),
                 };
-                write_raw_head(&mut out, vertex_count, faces).into_diagnostic().wrap_err_with(refuse)?;
+                write_raw_head(&mut out, vertex_count, faces)
+                    .into_diagnostic()
+                    .wrap_err_with(refuse)?;
                 Self::Raw(out)
             }
-            StreamSpec::Udp(port) => Self::udp(*port, Kind::Positions).into_diagnostic().wrap_err_with(refuse)?,
-            StreamSpec::UdpWeights(port) => Self::udp(*port, Kind::Weights).into_diagnostic().wrap_err_with(refuse)?,
+            StreamSpec::Udp(port) => Self::udp(*port, Kind::Positions)
+                .into_diagnostic()
+                .wrap_err_with(refuse)?,
+            StreamSpec::UdpWeights(port) => Self::udp(*port, Kind::Weights)
+                .into_diagnostic()
+                .wrap_err_with(refuse)?,
         })
     }
 
     fn udp(port: u16, kind: Kind) -> io::Result<Self> {
         let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
         socket.connect((Ipv4Addr::LOCALHOST, port))?;
-        Ok(Self::Udp { socket, kind, buffer: Vec::new() })
+        Ok(Self::Udp {
+            socket,
+            kind,
+            buffer: Vec::new(),
+        })
     }
 
     /// Writes a frame.
@@ -78,12 +101,19 @@ impl Sink {
                     Kind::Positions => shape.positions.as_flattened(),
                     Kind::Weights => &shape.weights,
                 };
-                write_datagrams(*kind, shape.frame, shape.at_us, values, buffer, |datagram| match socket.send(datagram) {
-                    Ok(_) => Ok(()),
-                    // Nobody listens on that port yet, or not any more: that may change.
-                    Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => Ok(()),
-                    Err(error) => Err(error.to_string()),
-                })
+                write_datagrams(
+                    *kind,
+                    shape.frame,
+                    shape.at_us,
+                    values,
+                    buffer,
+                    |datagram| match socket.send(datagram) {
+                        Ok(_) => Ok(()),
+                        // Nobody listens on that port yet, or not any more: that may change.
+                        Err(error) if error.kind() == io::ErrorKind::ConnectionRefused => Ok(()),
+                        Err(error) => Err(error.to_string()),
+                    },
+                )
             }
         }
     }
@@ -102,13 +132,20 @@ fn write_raw_head(out: &mut dyn Write, vertex_count: usize, faces: &[[u32; 3]]) 
     for number in [1, vertex_count as u32, faces.len() as u32] {
         out.write_all(&number.to_le_bytes())?;
     }
-    faces.as_flattened().iter().try_for_each(|v| out.write_all(&v.to_le_bytes()))?;
+    faces
+        .as_flattened()
+        .iter()
+        .try_for_each(|v| out.write_all(&v.to_le_bytes()))?;
     out.flush()
 }
 
 fn write_raw_frame(out: &mut dyn Write, shape: &Shape) -> io::Result<()> {
     out.write_all(&shape.at_us.to_le_bytes())?;
-    shape.positions.as_flattened().iter().try_for_each(|value| out.write_all(&value.to_le_bytes()))?;
+    shape
+        .positions
+        .as_flattened()
+        .iter()
+        .try_for_each(|value| out.write_all(&value.to_le_bytes()))?;
     // A reader at the other end of a pipe wants this frame now.
     out.flush()
 }

@@ -14,7 +14,8 @@ const NAME: usize = 14;
 const BAR: usize = 20;
 const COMPONENT: usize = 14;
 
-const KEYS: &str = "q quit   space stop/release   \u{2190} \u{2192} pages   \u{2193} into   \u{2191} out   f fine   r record   0 rest";
+const KEYS: &str =
+    "q quit   space stop/release   \u{2190} \u{2192} pages   \u{2193} into   \u{2191} out   f fine   r record   0 rest";
 
 /// Draws a moment.
 pub fn draw(frame: &mut Frame<'_>, labels: &Labels, snapshot: &Snapshot) {
@@ -27,7 +28,10 @@ pub fn draw(frame: &mut Frame<'_>, labels: &Labels, snapshot: &Snapshot) {
         None => Line::raw("no device"),
     });
     lines.push(Line::raw(""));
-    let heading = format!("{:NAME$} {:BAR$} {:COMPONENT$} {:>8}", "knob", "", "component", "weight");
+    let heading = format!(
+        "{:NAME$} {:BAR$} {:COMPONENT$} {:>8}",
+        "knob", "", "component", "weight"
+    );
     lines.push(Line::styled(heading, dim));
     knobs(&mut lines, labels, snapshot);
 
@@ -49,7 +53,10 @@ pub fn draw(frame: &mut Frame<'_>, labels: &Labels, snapshot: &Snapshot) {
     // In a low terminal knobs go first: what is wrong must be seen.
     let foot_height = (foot.len() as u16).min(area.height);
     let head_height = (lines.len() as u16).min(area.height - foot_height);
-    let head = Rect { height: head_height, ..area };
+    let head = Rect {
+        height: head_height,
+        ..area
+    };
     frame.render_widget(Paragraph::new(lines), head);
     let below = Rect {
         y: area.y + head_height,
@@ -62,9 +69,17 @@ pub fn draw(frame: &mut Frame<'_>, labels: &Labels, snapshot: &Snapshot) {
 fn knobs(lines: &mut Vec<Line<'static>>, labels: &Labels, snapshot: &Snapshot) {
     for (knob, name) in labels.knobs.iter().enumerate() {
         let position = snapshot.positions.get(knob).copied().flatten();
-        let mut own = snapshot.assignments.iter().filter(|assignment| assignment.knob == knob).peekable();
+        let mut own = snapshot
+            .assignments
+            .iter()
+            .filter(|assignment| assignment.knob == knob)
+            .peekable();
         let left = |first: bool| {
-            let (name, bar) = if first { (fit(name, NAME), bar(position)) } else { (fit("", NAME), " ".repeat(BAR)) };
+            let (name, bar) = if first {
+                (fit(name, NAME), bar(position))
+            } else {
+                (fit("", NAME), " ".repeat(BAR))
+            };
             format!("{name} {bar} ")
         };
         if own.peek().is_none() {
@@ -72,7 +87,10 @@ fn knobs(lines: &mut Vec<Line<'static>>, labels: &Labels, snapshot: &Snapshot) {
             lines.push(Line::raw(format!("{}{state}", left(true))));
         }
         for (n, assignment) in own.enumerate() {
-            let component = labels.components.get(assignment.control).map_or("?", |component| component.name.as_str());
+            let component = labels
+                .components
+                .get(assignment.control)
+                .map_or("?", |component| component.name.as_str());
             let weight = snapshot.weights.get(assignment.control).copied().unwrap_or(0.0);
             let color = match assignment.state {
                 TakeoverState::Engaged => Color::Green,
@@ -99,7 +117,11 @@ fn rates(snapshot: &Snapshot) -> String {
         text.push_str(&format!(", {} left out", snapshot.missed));
     }
     if let Some(age_us) = snapshot.age_us() {
-        text.push_str(&format!(", {:.0} readings/s, newest {} old", snapshot.event_rate, words::age(age_us)));
+        text.push_str(&format!(
+            ", {:.0} readings/s, newest {} old",
+            snapshot.event_rate,
+            words::age(age_us)
+        ));
     }
     text
 }
@@ -111,7 +133,9 @@ fn fit(text: &str, width: usize) -> String {
 }
 
 fn bar(position: Option<f32>) -> String {
-    let Some(position) = position else { return format!("{:BAR$}", "-") };
+    let Some(position) = position else {
+        return format!("{:BAR$}", "-");
+    };
     let cells = BAR - 2;
     let full = (position.clamp(0.0, 1.0) * cells as f32).round() as usize;
     format!("[{}{}]", "=".repeat(full), " ".repeat(cells - full))

@@ -18,7 +18,11 @@ const FRAME: Duration = Duration::from_millis(66);
 ///
 /// # Errors
 /// Standard output is no terminal that can be drawn on, or the system has no thread left.
-pub fn start_terminal(board: Arc<Board>, labels: Labels, requests: Sender<Request>) -> io::Result<JoinHandle<io::Result<()>>> {
+pub fn start_terminal(
+    board: Arc<Board>,
+    labels: Labels,
+    requests: Sender<Request>,
+) -> io::Result<JoinHandle<io::Result<()>>> {
     let mut terminal = ratatui::try_init()?;
     let spawned = thread::Builder::new().name("sinew-view".to_owned()).spawn(move || {
         let mut run = || -> io::Result<()> {

@@ -41,7 +41,12 @@ pub fn device(status: &DeviceStatus) -> String {
 
 /// Where the knobs are in the pages or the tree.
 pub fn page(labels: &Labels, snapshot: &Snapshot) -> String {
-    let name = |k: u16| labels.components.get(usize::from(k)).map_or("?", |component| component.name.as_str());
+    let name = |k: u16| {
+        labels
+            .components
+            .get(usize::from(k))
+            .map_or("?", |component| component.name.as_str())
+    };
     let mut parts = Vec::new();
     if labels.page_count > 1 {
         parts.push(format!("page {} of {}", snapshot.page + 1, labels.page_count));
@@ -86,21 +91,36 @@ pub fn warnings(snapshot: &Snapshot) -> Vec<String> {
         }
         let counters = &device.counters;
         if counters.bad > 0 {
-            let reason = counters.last_fault.map_or(String::new(), |fault| format!("; the last: {fault}"));
-            warnings.push(format!("{} of {} messages refused{reason}", counters.bad, counters.bad + counters.good));
+            let reason = counters
+                .last_fault
+                .map_or(String::new(), |fault| format!("; the last: {fault}"));
+            warnings.push(format!(
+                "{} of {} messages refused{reason}",
+                counters.bad,
+                counters.bad + counters.good
+            ));
         }
         if counters.clamped > 0 {
-            warnings.push(format!("{} readings beyond their scale: set full_scale", counters.clamped));
+            warnings.push(format!(
+                "{} readings beyond their scale: set full_scale",
+                counters.clamped
+            ));
         }
     }
     if snapshot.surface.unlisted > 0 {
-        warnings.push(format!("{} readings of knobs that the map has not", snapshot.surface.unlisted));
+        warnings.push(format!(
+            "{} readings of knobs that the map has not",
+            snapshot.surface.unlisted
+        ));
     }
     if snapshot.surface.supply > 0.0 && snapshot.surface.supply < 0.98 {
         warnings.push(format!("the supply sagged to {:.0} %", snapshot.surface.supply * 100.0));
     }
     if snapshot.stream_dropped > 0 {
-        warnings.push(format!("a stream is behind: {} frames left out", snapshot.stream_dropped));
+        warnings.push(format!(
+            "a stream is behind: {} frames left out",
+            snapshot.stream_dropped
+        ));
     }
     warnings.extend(snapshot.trouble.clone());
     warnings
@@ -120,8 +140,16 @@ pub fn status_line(labels: &Labels, snapshot: &Snapshot) -> String {
     if let Some(recording) = &snapshot.recording {
         text.push_str(&format!("  rec {}", recording.frames));
     }
-    let moved = labels.components.iter().zip(&snapshot.weights).filter(|(_, weight)| **weight != 0.0);
-    let shown: Vec<String> = moved.clone().take(6).map(|(component, weight)| format!("{}={weight:.3}", component.name)).collect();
+    let moved = labels
+        .components
+        .iter()
+        .zip(&snapshot.weights)
+        .filter(|(_, weight)| **weight != 0.0);
+    let shown: Vec<String> = moved
+        .clone()
+        .take(6)
+        .map(|(component, weight)| format!("{}={weight:.3}", component.name))
+        .collect();
     if !shown.is_empty() {
         text.push_str(&format!("  {}", shown.join(" ")));
     }

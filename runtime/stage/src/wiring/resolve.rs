@@ -76,8 +76,10 @@ impl Resolver<'_> {
         let mut seen: Vec<&Place> = Vec::new();
         for place in knobs.chain(buttons) {
             if seen.contains(&&place.value) {
-                return Err(Fault::new(place.span.clone(), format!("knob {} is listed already", place.value))
-                    .help("a knob that moves several components has one [[knob]] with a [[knob.control]] for each"));
+                return Err(
+                    Fault::new(place.span.clone(), format!("knob {} is listed already", place.value))
+                        .help("a knob that moves several components has one [[knob]] with a [[knob.control]] for each"),
+                );
             }
             seen.push(&place.value);
         }
@@ -88,15 +90,26 @@ impl Resolver<'_> {
         let entry = self.file.tree.as_ref();
         let (coarse, fine) = entry.map_or((None, None), |tree| (tree.coarse, tree.fine));
         let listed: &[Found<Place>] = entry.map_or(&[], |tree| &tree.knobs);
-        let own: Vec<&KnobEntry> = self.file.knobs.iter().filter(|knob| !knob.controls.is_empty()).collect();
+        let own: Vec<&KnobEntry> = self
+            .file
+            .knobs
+            .iter()
+            .filter(|knob| !knob.controls.is_empty())
+            .collect();
         let mut places: Vec<Option<Place>> = Vec::new();
         for place in listed {
             if own.iter().any(|knob| knob.place.value == place.value) {
-                return Err(Fault::new(place.span.clone(), format!("knob {} has a component of its own", place.value))
-                    .help("leave it out of the tree, or take its component away"));
+                return Err(Fault::new(
+                    place.span.clone(),
+                    format!("knob {} has a component of its own", place.value),
+                )
+                .help("leave it out of the tree, or take its component away"));
             }
             if places.contains(&Some(place.value.clone())) {
-                return Err(Fault::new(place.span.clone(), format!("knob {} is in the tree already", place.value)));
+                return Err(Fault::new(
+                    place.span.clone(),
+                    format!("knob {} is in the tree already", place.value),
+                ));
             }
             places.push(Some(place.value.clone()));
         }
@@ -171,7 +184,9 @@ impl Resolver<'_> {
 
     /// Appends a knob; returns its index.
     fn add_knob(&mut self, place: Option<Place>) -> u16 {
-        let entry = place.as_ref().and_then(|place| self.file.knobs.iter().find(|knob| knob.place.value == *place));
+        let entry = place
+            .as_ref()
+            .and_then(|place| self.file.knobs.iter().find(|knob| knob.place.value == *place));
         let (number, name) = match &place {
             Some(Place::Number(address)) => {
                 let heard = self.heard.iter().find(|knob| knob.address == *address);
@@ -180,7 +195,10 @@ impl Resolver<'_> {
             Some(Place::Name(name)) => (None, Some(name.as_str())),
             None => (None, None),
         };
-        let shown = entry.map(|entry| entry.name.as_str()).filter(|name| !name.is_empty()).or(name);
+        let shown = entry
+            .map(|entry| entry.name.as_str())
+            .filter(|name| !name.is_empty())
+            .or(name);
         let knob = WiredKnob {
             address: match &place {
                 Some(place) => self.wiring.routes.address_of(place),
@@ -201,8 +219,11 @@ impl Resolver<'_> {
             return Ok(()); // a knob of the tree: its entry was looked at there
         }
         if entry.controls.is_empty() {
-            return Err(Fault::new(entry.place.span.clone(), format!("knob {} moves nothing", entry.place.value))
-                .help("add component = \"...\" or list it in [tree]"));
+            return Err(Fault::new(
+                entry.place.span.clone(),
+                format!("knob {} moves nothing", entry.place.value),
+            )
+            .help("add component = \"...\" or list it in [tree]"));
         }
         let knob = self.add_knob(Some(entry.place.value.clone()));
         for control in &entry.controls {
@@ -210,7 +231,9 @@ impl Resolver<'_> {
             let on = |page: OnPage, other: OnPage| page == OnPage::Every || other == OnPage::Every || page == other;
             let meets = |earlier: &&Binding| earlier.control == binding.control && on(earlier.page, binding.page);
             if let Some(first) = self.wiring.bindings.iter().find(meets) {
-                let other = self.places[usize::from(first.knob)].as_ref().map_or(String::new(), Place::to_string);
+                let other = self.places[usize::from(first.knob)]
+                    .as_ref()
+                    .map_or(String::new(), Place::to_string);
                 let message = format!("`{}` is moved by knob {other} already", control.component.value);
                 return Err(Fault::new(control.span.clone(), message).help("put one of the two on another `page`"));
             }
@@ -265,7 +288,10 @@ impl Resolver<'_> {
         let (file, mut buttons) = (self.file, Vec::new());
         for entry in &file.buttons {
             if self.places.contains(&Some(entry.place.value.clone())) {
-                return Err(Fault::new(entry.place.span.clone(), format!("{} is a knob of the tree", entry.place.value)));
+                return Err(Fault::new(
+                    entry.place.span.clone(),
+                    format!("{} is a knob of the tree", entry.place.value),
+                ));
             }
             let command = match &entry.command {
                 ButtonCommand::Plain(command) => *command,
@@ -287,7 +313,10 @@ impl Resolver<'_> {
 }
 
 fn one_page_too_many(span: &Range<usize>, page: u16, page_count: u16) -> Fault {
-    Fault::new(span.clone(), format!("there is no page {page}: knobs use pages up to {page_count}"))
+    Fault::new(
+        span.clone(),
+        format!("there is no page {page}: knobs use pages up to {page_count}"),
+    )
 }
 
 /// What to say of a component that the package lacks: the fault, and what was meant.

@@ -11,7 +11,10 @@ pub fn split(basis: &Basis<'_>, knob_count: u16, coarse: Option<u16>, fine: Opti
         (Some(coarse), None) => (coarse, knob_count.saturating_sub(coarse)),
         (None, Some(fine)) => (knob_count.saturating_sub(fine).max(1), fine),
         (None, None) => {
-            let coarse_components = basis.components().filter(|component| component.parent.is_none()).count();
+            let coarse_components = basis
+                .components()
+                .filter(|component| component.parent.is_none())
+                .count();
             if coarse_components == basis.component_count() {
                 return (knob_count, 0);
             }

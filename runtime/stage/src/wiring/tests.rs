@@ -20,7 +20,10 @@ fn file(text: &str) -> KnobsFile {
 }
 
 fn heard(addresses: &[u16]) -> Vec<HeardKnob> {
-    addresses.iter().map(|&address| HeardKnob { address, name: None }).collect()
+    addresses
+        .iter()
+        .map(|&address| HeardKnob { address, name: None })
+        .collect()
 }
 
 fn wire(text: &str, addresses: &[u16]) -> Wiring {
@@ -85,10 +88,16 @@ fn limits_and_scales_stay_within_the_component() {
     let component = basis.component(2);
     let wiring = wire("[[knob]]\nknob = 4\ncomponent = \"c2\"\nscale = -0.5\n", &[]);
     let response = wiring.bindings[0].response;
-    assert_eq!((response.minimum, response.maximum), (Some(0.5 * component.minimum), Some(0.5 * component.maximum)));
+    assert_eq!(
+        (response.minimum, response.maximum),
+        (Some(0.5 * component.minimum), Some(0.5 * component.maximum))
+    );
     assert!(response.inverted);
     let too_wide = refused("[[knob]]\nknob = 4\ncomponent = \"c2\"\nmaximum = 1e6\n");
-    assert!(too_wide.starts_with("knobs.toml:3:13: the limits must be in order"), "{too_wide}");
+    assert!(
+        too_wide.starts_with("knobs.toml:3:13: the limits must be in order"),
+        "{too_wide}"
+    );
     assert!(too_wide.contains("`c2` goes from"), "{too_wide}");
 }
 
@@ -99,7 +108,8 @@ fn two_hands_on_one_component_need_two_pages() {
         refused(two),
         "knobs.toml:6:13: `c2` is moved by knob 4 already (put one of the two on another `page`)"
     );
-    let pages = two.replacen("\"c2\"", "\"c2\"\npage = 1", 1) + "page = 2\n[[button]]\nknob = 9\ncommand = \"page\"\npage = 2";
+    let pages =
+        two.replacen("\"c2\"", "\"c2\"\npage = 1", 1) + "page = 2\n[[button]]\nknob = 9\ncommand = \"page\"\npage = 2";
     let wiring = wire(&pages, &[]);
     assert_eq!(wiring.bindings[1].page, OnPage::Only(1));
     assert_eq!(wiring.buttons[0].command, Command::Page(1));
@@ -119,8 +129,13 @@ fn one_place_has_one_entry() {
     let in_tree = "[tree]\nknobs = [3, 4]\n[[knob]]\nknob = 4\ncomponent = \"c2\"\n";
     assert!(refused(in_tree).starts_with("knobs.toml:2:13: knob 4 has a component of its own"));
     assert!(refused("[tree]\nknobs = [3, 3]").starts_with("knobs.toml:2:13: knob 3 is in the tree already"));
-    assert!(refused("[tree]\nknobs = [3, 4]\ncoarse = 3\nfine = 5").contains("2 knobs are listed, and coarse + fine make 8"));
-    assert!(refused("[tree]\nknobs = [3, 4]\n[[button]]\nknob = 3\ncommand = \"stop\"").contains("3 is a knob of the tree"));
+    assert!(
+        refused("[tree]\nknobs = [3, 4]\ncoarse = 3\nfine = 5")
+            .contains("2 knobs are listed, and coarse + fine make 8")
+    );
+    assert!(
+        refused("[tree]\nknobs = [3, 4]\n[[button]]\nknob = 3\ncommand = \"stop\"").contains("3 is a knob of the tree")
+    );
 }
 
 #[test]
@@ -128,7 +143,11 @@ fn a_tree_takes_what_the_rest_of_the_file_leaves() {
     let text = "[tree]\n[[knob]]\nknob = 1\ncomponent = \"c2\"\n[[knob]]\nknob = 2\nname = \"brow\"\n[[button]]\nknob = 5\ncommand = \"stop\"\n";
     let wiring = wire(text, &[0, 1, 2, 3, 4, 5]);
     let addresses: Vec<u16> = wiring.knobs.iter().map(|knob| knob.address).collect();
-    assert_eq!(addresses, [2, 0, 3, 4, 1], "listed ones first, then those heard; own ones last");
+    assert_eq!(
+        addresses,
+        [2, 0, 3, 4, 1],
+        "listed ones first, then those heard; own ones last"
+    );
     assert_eq!(wiring.knobs[0].name, "brow");
 }
 
@@ -136,31 +155,64 @@ fn a_tree_takes_what_the_rest_of_the_file_leaves() {
 fn calibrations_follow_names_and_make_knobs_known() {
     let bytes = package();
     let basis = Basis::open(&bytes).unwrap();
-    let pot = |lowest| KnobCalibration { full_scale: 1023, lowest, highest: 1000, centre: None, noise: 2 };
-    let knob = |address, name: &str, lowest| CalibratedKnob { address, name: name.to_owned(), calibration: pot(lowest) };
+    let pot = |lowest| KnobCalibration {
+        full_scale: 1023,
+        lowest,
+        highest: 1000,
+        centre: None,
+        noise: 2,
+    };
+    let knob = |address, name: &str, lowest| CalibratedKnob {
+        address,
+        name: name.to_owned(),
+        calibration: pot(lowest),
+    };
     let device = DeviceCalibration {
         device: "x".to_owned(),
         follow_supply: true,
         knobs: vec![knob(0, "", 10), knob(6, "", 16), knob(3, "jaw", 13)],
     };
-    let wiring = resolve(&file("[tree]\n[[knob]]\nknob = \"jaw\"\n"), &basis, &heard(&[0, 1]), Some(&device)).unwrap();
-    let lowest: Vec<_> = wiring.knobs.iter().map(|knob| knob.calibration.map(|c| c.lowest)).collect();
+    let wiring = resolve(
+        &file("[tree]\n[[knob]]\nknob = \"jaw\"\n"),
+        &basis,
+        &heard(&[0, 1]),
+        Some(&device),
+    )
+    .unwrap();
+    let lowest: Vec<_> = wiring
+        .knobs
+        .iter()
+        .map(|knob| knob.calibration.map(|c| c.lowest))
+        .collect();
     assert_eq!(lowest, [Some(13), Some(10), None, Some(16)]);
     assert!(wiring.settings.follow_supply);
-    assert!(!resolve(&file("[device]\nfollow_supply = false"), &basis, &[], Some(&device)).unwrap().settings.follow_supply);
+    assert!(
+        !resolve(&file("[device]\nfollow_supply = false"), &basis, &[], Some(&device))
+            .unwrap()
+            .settings
+            .follow_supply
+    );
 }
 
 #[test]
 fn the_router_gives_each_knob_its_place_once() {
-    let wiring = wire("[tree]\ncoarse = 2\nfine = 1\n[[knob]]\nknob = \"jaw\"\ncomponent = \"c2\"\n", &[4]);
-    let [named, ..] = wiring.routes.named.as_slice() else { panic!() };
+    let wiring = wire(
+        "[tree]\ncoarse = 2\nfine = 1\n[[knob]]\nknob = \"jaw\"\ncomponent = \"c2\"\n",
+        &[4],
+    );
+    let [named, ..] = wiring.routes.named.as_slice() else {
+        panic!()
+    };
     let mut router = Router::new(wiring.routes.clone());
     let name_of = |knob: u16| (knob == 7).then(|| "jaw".to_owned());
     assert_eq!(router.route(4, name_of), 4);
     assert_eq!(router.route(7, name_of), named.1);
     let free = &wiring.routes.free;
     assert_eq!(free.len(), 2);
-    assert_eq!([router.route(30, name_of), router.route(2, name_of)], [free[0], free[1]]);
+    assert_eq!(
+        [router.route(30, name_of), router.route(2, name_of)],
+        [free[0], free[1]]
+    );
     assert_eq!(router.route(30, name_of), free[0], "it keeps it");
     assert_eq!(router.route(9, name_of), 9, "no room: it is what it is");
     assert_eq!(router.device_address(free[1]), Some(2));

@@ -6,7 +6,9 @@ use std::path::PathBuf;
 use clap::Args;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use miette::miette;
-use sinew_runtime::input::{CalibrationRefusal, CalibrationSettings, Calibrator, DeviceStatus, KnobProgress, KnobTrial, Progress};
+use sinew_runtime::input::{
+    CalibrationRefusal, CalibrationSettings, Calibrator, DeviceStatus, KnobProgress, KnobTrial, Progress,
+};
 
 use super::{Listener, knob_words};
 use crate::calibration::{CalibratedKnob, Calibrations, DeviceCalibration, default_path};
@@ -93,11 +95,18 @@ pub fn run(arguments: &CalibrateArguments, quiet: bool) -> Result<(), Failure> {
     let follow_supply = calibrator.lowest_supply() < 0.98;
     let count = measured.len();
     let mut knobs = measured;
-    let kept = before.knobs.into_iter().filter(|old| !knobs.iter().any(|new| new.address == old.address));
+    let kept = before
+        .knobs
+        .into_iter()
+        .filter(|old| !knobs.iter().any(|new| new.address == old.address));
     let kept: Vec<CalibratedKnob> = kept.collect();
     knobs.extend(kept);
     knobs.sort_by_key(|knob| knob.address);
-    let calibration = DeviceCalibration { device: device.clone(), follow_supply, knobs };
+    let calibration = DeviceCalibration {
+        device: device.clone(),
+        follow_supply,
+        knobs,
+    };
     calibrations.store(&path, calibration)?;
     if !quiet {
         if follow_supply {
@@ -111,7 +120,9 @@ pub fn run(arguments: &CalibrateArguments, quiet: bool) -> Result<(), Failure> {
 fn results(calibrator: &Calibrator<'_>, status: &DeviceStatus) -> (Vec<CalibratedKnob>, Vec<String>) {
     let (mut measured, mut refused) = (Vec::new(), Vec::new());
     for index in 0..calibrator.knob_count() {
-        let Some(progress) = calibrator.progress(index) else { continue };
+        let Some(progress) = calibrator.progress(index) else {
+            continue;
+        };
         match calibrator.result(index) {
             Ok(calibration) => measured.push(CalibratedKnob {
                 address: progress.knob,
@@ -139,13 +150,22 @@ struct Bars {
 
 impl Bars {
     fn new(quiet: bool) -> Self {
-        let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-        Self { all: MultiProgress::with_draw_target(target), bars: Vec::new() }
+        let target = if quiet {
+            ProgressDrawTarget::hidden()
+        } else {
+            ProgressDrawTarget::stderr()
+        };
+        Self {
+            all: MultiProgress::with_draw_target(target),
+            bars: Vec::new(),
+        }
     }
 
     fn show(&mut self, calibrator: &Calibrator<'_>, status: &DeviceStatus) {
         for index in 0..calibrator.knob_count() {
-            let Some(progress) = calibrator.progress(index) else { continue };
+            let Some(progress) = calibrator.progress(index) else {
+                continue;
+            };
             if index == self.bars.len() {
                 let bar = self.all.add(ProgressBar::new(u64::from(progress.full_scale.max(1))));
                 let style = ProgressStyle::with_template("{prefix:<16} [{bar:24}] {msg}");

@@ -136,10 +136,18 @@ pub fn run(arguments: &LearnArguments, quiet: bool) -> Result<(), Failure> {
 
 /// The next component that no knob has, coarse ones first.
 fn proposal(basis: &Basis<'_>, learned: &[(u16, Given)]) -> Option<String> {
-    let taken = |name: &str| learned.iter().any(|(_, given)| matches!(given, Given::Component(own) if own == name));
+    let taken = |name: &str| {
+        learned
+            .iter()
+            .any(|(_, given)| matches!(given, Given::Component(own) if own == name))
+    };
     let mut components: Vec<_> = basis.components().collect();
     components.sort_by_key(|component| component.level);
-    components.into_iter().map(|component| component.name).find(|name| !taken(name)).map(str::to_owned)
+    components
+        .into_iter()
+        .map(|component| component.name)
+        .find(|name| !taken(name))
+        .map(str::to_owned)
 }
 
 enum Answer {
@@ -169,7 +177,9 @@ fn ask(basis: &Basis<'_>, knob: &str, proposed: Option<&str>, learned: &[(u16, G
             "done" | "q" => return Ok(Answer::Done),
             _ => {}
         }
-        let taken = learned.iter().any(|(_, given)| matches!(given, Given::Component(own) if own == word));
+        let taken = learned
+            .iter()
+            .any(|(_, given)| matches!(given, Given::Component(own) if own == word));
         if taken {
             eprintln!("another knob has {word} already");
         } else if basis.component_named(word).is_some() {
@@ -184,12 +194,18 @@ fn ask(basis: &Basis<'_>, knob: &str, proposed: Option<&str>, learned: &[(u16, G
 /// The file. Knobs with names are known by them, MIDI knobs by their messages, others by their numbers.
 fn mapping(package: &Path, device: &DeviceArguments, status: &DeviceStatus, learned: &[(u16, Given)]) -> String {
     // Writing to a string cannot fail.
-    let mut text = format!("# Learned by `sinew-stage knobs learn` for {}.\n", package.display().to_string().replace('\n', " "));
+    let mut text = format!(
+        "# Learned by `sinew-stage knobs learn` for {}.\n",
+        package.display().to_string().replace('\n', " ")
+    );
     text.push_str("# docs/knobs.toml shows what else may stand here.\n");
     let chosen = [
         device.serial.as_ref().map(|port| format!("serial = {}", quoted(port))),
         device.midi.as_ref().map(|name| format!("midi = {}", quoted(name))),
-        device.osc.as_ref().map(|address| format!("osc = {}", quoted(&address.to_string()))),
+        device
+            .osc
+            .as_ref()
+            .map(|address| format!("osc = {}", quoted(&address.to_string()))),
         device.protocol.map(|protocol| format!("protocol = \"{protocol}\"")),
         device.baud.map(|baud| format!("baud = {baud}")),
         device.full_scale.map(|full_scale| format!("full_scale = {full_scale}")),
@@ -199,7 +215,11 @@ fn mapping(package: &Path, device: &DeviceArguments, status: &DeviceStatus, lear
         let _ = write!(text, "\n[device]\n{}\n", chosen.join("\n"));
     }
     for (knob, given) in learned {
-        let named = status.names.iter().find(|named| named.knob == *knob).map(|named| named.name.as_str());
+        let named = status
+            .names
+            .iter()
+            .find(|named| named.knob == *knob)
+            .map(|named| named.name.as_str());
         // A device may call a knob "cc 21", which a file reads as a MIDI message.
         let is_name = |name: &&str| matches!(Place::of(WholeOrText::Text(name)), Ok(Place::Name(_)));
         let name = named.filter(is_name).map(quoted);

@@ -4,6 +4,8 @@ mod calibrate;
 mod learn;
 mod list;
 mod monitor;
+#[cfg(all(unix, feature = "serial"))]
+mod simulate;
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
@@ -29,6 +31,9 @@ pub enum KnobsCommand {
     Learn(learn::LearnArguments),
     /// Measure every knob's true range, centre and noise by turning it once
     Calibrate(calibrate::CalibrateArguments),
+    /// Be a knob box without hardware, on a pseudo-terminal, with the faults of real ones
+    #[cfg(all(unix, feature = "serial"))]
+    Simulate(simulate::SimulateArguments),
 }
 
 /// Runs one of them.
@@ -41,6 +46,8 @@ pub fn run(command: &KnobsCommand, quiet: bool) -> Result<(), Failure> {
         KnobsCommand::Monitor(arguments) => monitor::run(arguments),
         KnobsCommand::Learn(arguments) => learn::run(arguments, quiet),
         KnobsCommand::Calibrate(arguments) => calibrate::run(arguments, quiet),
+        #[cfg(all(unix, feature = "serial"))]
+        KnobsCommand::Simulate(arguments) => simulate::run(arguments, quiet),
     }
 }
 

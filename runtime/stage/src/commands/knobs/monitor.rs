@@ -58,7 +58,15 @@ pub fn run(arguments: &MonitorArguments) -> Result<(), Failure> {
                 Some(index) => &mut rows[index],
                 None => {
                     let at = rows.partition_point(|row| row.knob < event.knob);
-                    rows.insert(at, Row { knob: event.knob, reading: event.reading, turned: 0, count: 0 });
+                    rows.insert(
+                        at,
+                        Row {
+                            knob: event.knob,
+                            reading: event.reading,
+                            turned: 0,
+                            count: 0,
+                        },
+                    );
                     &mut rows[at]
                 }
             };
@@ -91,7 +99,11 @@ fn show(text: &str, live: bool, height: &mut usize) {
     let mut out = std::io::stdout().lock();
     if live {
         // Up to the first line of the last block, then clear to the end of the screen.
-        let up = if *height > 0 { format!("\x1b[{height}A\r\x1b[J") } else { String::new() };
+        let up = if *height > 0 {
+            format!("\x1b[{height}A\r\x1b[J")
+        } else {
+            String::new()
+        };
         let _ = out.write_all(up.as_bytes());
         *height = text.lines().count();
     }

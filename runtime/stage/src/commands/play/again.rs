@@ -38,7 +38,11 @@ pub fn run(arguments: &PlayArguments, basis: &Basis<'_>, path: &Path, quiet: boo
     let mut memory = SceneMemory::for_basis(basis);
     let mut scene = Scene::new(basis, &mut memory)?;
     let names = || basis.components().map(|component| component.name.to_owned()).collect();
-    let table = arguments.export.as_ref().map(|path| WeightsTable::new(path, names())).transpose()?;
+    let table = arguments
+        .export
+        .as_ref()
+        .map(|path| WeightsTable::new(path, names()))
+        .transpose()?;
     let streams = start_streams(arguments, basis)?;
     let tree = take.tree().map(|tree| (tree.coarse_knobs, tree.fine_knobs));
     let labels = Labels::new(
@@ -73,11 +77,23 @@ pub fn run(arguments: &PlayArguments, basis: &Basis<'_>, path: &Path, quiet: boo
     let cut = if outcome.cut { ", not to its end" } else { "" };
     say(quiet, &format!("replayed {}{cut}", outcome.checksum));
     if outcome.skipped > 0 {
-        say(quiet, &format!("{} records left out: this package has no such component", outcome.skipped));
+        say(
+            quiet,
+            &format!(
+                "{} records left out: this package has no such component",
+                outcome.skipped
+            ),
+        );
     }
     if let Some(table) = &replay.table {
         let rows = table.finish()?;
-        say(quiet, &format!("{rows} frames of weights written to {}", arguments.export.as_deref().unwrap_or(path).display()));
+        say(
+            quiet,
+            &format!(
+                "{rows} frames of weights written to {}",
+                arguments.export.as_deref().unwrap_or(path).display()
+            ),
+        );
     }
     finish_streams(replay.streams, quiet)?;
     if outcome.interrupted {
@@ -103,7 +119,15 @@ fn check_length(take: &Take<'_>, fps: f64, path: &Path) -> Result<(), Failure> {
 }
 
 fn describe(take: &Take<'_>, basis: &Basis<'_>, parts: &TakeParts<'_>, path: &Path, quiet: bool) {
-    say(quiet, &format!("{}: {} records of {}", path.display(), take.record_count(), take.device()));
+    say(
+        quiet,
+        &format!(
+            "{}: {} records of {}",
+            path.display(),
+            take.record_count(),
+            take.device()
+        ),
+    );
     if !take.is_closed() {
         let lost = match take.lost_bytes() {
             0 => "nothing that was written is lost".to_owned(),
@@ -111,13 +135,19 @@ fn describe(take: &Take<'_>, basis: &Basis<'_>, parts: &TakeParts<'_>, path: &Pa
         };
         say(quiet, &format!("note: the take was not closed; {lost}"));
     } else if take.lost_bytes() > 0 {
-        say(quiet, &format!("note: {} bytes behind its end are not read", take.lost_bytes()));
+        say(
+            quiet,
+            &format!("note: {} bytes behind its end are not read", take.lost_bytes()),
+        );
     }
     if take.compact_id() != basis.compact_id() {
         say(quiet, "note: played on another package; components are found by name");
     }
     if !parts.missing.is_empty() {
-        let message = format!("note: this package has no {}; what moved them is left out", parts.missing.join(", "));
+        let message = format!(
+            "note: this package has no {}; what moved them is left out",
+            parts.missing.join(", ")
+        );
         say(quiet, &message);
     }
 }

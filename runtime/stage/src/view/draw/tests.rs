@@ -11,7 +11,11 @@ use super::*;
 use crate::snapshot::{ComponentLabel, Recording};
 
 fn labels() -> Labels {
-    let component = |name: &str| ComponentLabel { name: name.to_owned(), minimum: -1.0, maximum: 1.0 };
+    let component = |name: &str| ComponentLabel {
+        name: name.to_owned(),
+        minimum: -1.0,
+        maximum: 1.0,
+    };
     Labels {
         title: "walk.sinew: 2518 vertices, 3 components".to_owned(),
         knobs: vec!["jaw".to_owned(), "knob 1".to_owned(), "knob 2".to_owned()],
@@ -23,7 +27,10 @@ fn labels() -> Labels {
 
 fn snapshot() -> Snapshot {
     let assignment = |knob, control, state| Assignment { knob, control, state };
-    let waiting = TakeoverState::Waiting { direction: Direction::Left, distance: 0.34 };
+    let waiting = TakeoverState::Waiting {
+        direction: Direction::Left,
+        distance: 0.34,
+    };
     let device = DeviceStatus {
         counts: SourceStatus::default(),
         link: Link::Open,
@@ -31,7 +38,12 @@ fn snapshot() -> Snapshot {
         baud: Some(9600),
         recognition: Recognition::Named(Protocol::Lines),
         confidence: 100,
-        counters: Counters { good: 988, bad: 12, last_fault: Some(Fault::NotNumbers), ..Counters::default() },
+        counters: Counters {
+            good: 988,
+            bad: 12,
+            last_fault: Some(Fault::NotNumbers),
+            ..Counters::default()
+        },
         merged: 0,
         waiting: 0,
         firmware: None,
@@ -47,10 +59,16 @@ fn snapshot() -> Snapshot {
             assignment(1, 2, TakeoverState::Held),
         ],
         weights: vec![0.25, -1.0, 0.0],
-        view: TreeView { focus: Some(0), ..TreeView::default() },
+        view: TreeView {
+            focus: Some(0),
+            ..TreeView::default()
+        },
         surface: SurfaceStatus {
             last_event_us: Some(1_992_000),
-            health: Health { lost: true, ..Health::default() },
+            health: Health {
+                lost: true,
+                ..Health::default()
+            },
             supply: 1.0,
             ..SurfaceStatus::default()
         },
@@ -60,7 +78,10 @@ fn snapshot() -> Snapshot {
         frame_us: 210.0,
         frame_us_max: 480,
         event_rate: 300.0,
-        recording: Some(Recording { file: "show.take".to_owned(), frames: 60 }),
+        recording: Some(Recording {
+            file: "show.take".to_owned(),
+            frames: 60,
+        }),
         ..Snapshot::default()
     }
 }
@@ -69,7 +90,13 @@ fn text(width: u16, height: u16, labels: &Labels, snapshot: &Snapshot) -> Vec<St
     let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
     terminal.draw(|frame| draw(frame, labels, snapshot)).unwrap();
     let buffer = terminal.backend().buffer();
-    let row = |y| (0..width).map(|x| buffer[(x, y)].symbol()).collect::<String>().trim_end().to_owned();
+    let row = |y| {
+        (0..width)
+            .map(|x| buffer[(x, y)].symbol())
+            .collect::<String>()
+            .trim_end()
+            .to_owned()
+    };
     (0..height).map(row).collect()
 }
 
@@ -100,7 +127,10 @@ fn a_line_a_knob_then_what_matters() {
 #[test]
 fn a_low_terminal_keeps_warnings_and_nothing_breaks_in_a_tiny_one() {
     let lines = text(100, 8, &labels(), &snapshot());
-    assert!(lines.contains(&"unplugged: holding, then easing to rest".to_owned()), "{lines:#?}");
+    assert!(
+        lines.contains(&"unplugged: holding, then easing to rest".to_owned()),
+        "{lines:#?}"
+    );
     for (width, height) in [(1, 1), (3, 2), (200, 1), (0, 0)] {
         text(width, height, &labels(), &snapshot());
     }
