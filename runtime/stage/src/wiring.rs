@@ -184,14 +184,6 @@ impl Router {
             named.is_none()
         });
     }
-
-    /// The device's address of a knob of the map, once it was heard.
-    pub fn device_address(&self, map_address: u16) -> Option<u16> {
-        self.table
-            .iter()
-            .position(|&routed| routed == map_address)
-            .map(|address| address as u16)
-    }
 }
 
 #[cfg(test)]

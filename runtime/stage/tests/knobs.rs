@@ -8,7 +8,7 @@ use core::time::Duration;
 use std::io::Write;
 
 use common::{Ran, Stage, table};
-use sinew_simulator::{BoxSettings, Command, Dialect, KnobBox, Port, Running, Script, Simulator};
+use sinew_simulator::{BoxSettings, Dialect, KnobBox, Port, Running, Script, Simulator};
 
 fn simulate(stage: &Stage, dialect: Dialect, script: &str) -> Running {
     let settings = BoxSettings {

@@ -2,8 +2,6 @@
 
 use std::path::Path;
 
-use sinew_runtime::input::{Centre, Curve, Takeover};
-
 use super::*;
 
 fn parse(text: &str) -> Result<KnobsFile, ConfigError> {
@@ -58,7 +56,7 @@ fn the_documented_example_says_what_it_claims() {
 #[test]
 fn the_example_shows_every_key() {
     let text = include_str!("../../../../docs/knobs.toml");
-    let source = [include_str!("mod.rs"), include_str!("place.rs")].concat();
+    let source = include_str!("parse.rs");
     let keys = source.match_indices("keys.").chain(source.match_indices("table."));
     let mut count = 0;
     for (at, start) in keys {

@@ -215,7 +215,6 @@ fn the_router_gives_each_knob_its_place_once() {
     );
     assert_eq!(router.route(30, name_of), free[0], "it keeps it");
     assert_eq!(router.route(9, name_of), 9, "no room: it is what it is");
-    assert_eq!(router.device_address(free[1]), Some(2));
     // A name that comes late.
     router.refresh(|knob| (knob == 9).then(|| "jaw".to_owned()));
     assert_eq!(router.route(9, name_of), named.1);
