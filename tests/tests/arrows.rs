@@ -14,6 +14,7 @@ use sinew_tests::workspace_folder;
 const ARROWS: &[(&str, &[&str])] = &[
     ("sinew-formats", &[]),
     ("sinew-runtime", &["sinew-formats"]),
+    ("sinew-simulator", &["sinew-runtime"]),
     ("sinew-bake", &["sinew-formats"]),
     ("sinew-synthesize", &["sinew-formats"]),
     ("sinew-peers", &["sinew-formats", "sinew-bake", "sinew-synthesize"]),
@@ -28,8 +29,12 @@ const ARROWS: &[(&str, &[&str])] = &[
     ),
 ];
 
-/// What a crate may use in its tests and benchmarks besides: the runtime's benchmarks play packages baked on the spot.
-const DEVELOPMENT_ARROWS: &[(&str, &[&str])] = &[("sinew-runtime", &["sinew-peers"])];
+/// What a crate may use in its tests and benchmarks besides: the runtime's benchmarks and the simulated box's tests play packages
+/// baked on the spot.
+const DEVELOPMENT_ARROWS: &[(&str, &[&str])] = &[
+    ("sinew-runtime", &["sinew-peers"]),
+    ("sinew-simulator", &["sinew-bake"]),
+];
 
 /// Everything that the runtime links, all of it without std.
 const RUNTIME_CLOSURE: &[&str] = &[
