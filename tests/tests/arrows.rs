@@ -17,6 +17,10 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("sinew-simulator", &["sinew-runtime"]),
     ("sinew-bake", &["sinew-formats"]),
     ("sinew-synthesize", &["sinew-formats"]),
+    (
+        "sinew-stage",
+        &["sinew-formats", "sinew-runtime", "sinew-bake", "sinew-simulator"],
+    ),
     ("sinew-peers", &["sinew-formats", "sinew-bake", "sinew-synthesize"]),
     (
         "sinew-trainer",

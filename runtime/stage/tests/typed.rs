@@ -170,6 +170,18 @@ fn a_recording_can_begin_and_end_while_it_plays() {
     assert_eq!(last[1..], [0.0; 7], "and ends where they went");
 }
 
+#[cfg(unix)]
+#[test]
+fn a_recording_that_cannot_begin_does_not_end_the_show() {
+    let stage = Stage::new();
+    // The name that a recording would take is a link to nowhere: it neither is there nor can be made.
+    std::os::unix::fs::symlink(stage.path("no/where"), stage.path("sinew.take")).unwrap();
+    let ran = stage
+        .run("play model.sinew --typed --headless --for 600ms", "record\nc0 0.3\n")
+        .expect(2);
+    ran.says(&["played ", "sinew.take is there already"]);
+}
+
 #[test]
 fn refusals_name_the_file_and_the_cure() {
     let stage = Stage::new();

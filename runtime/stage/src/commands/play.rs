@@ -316,6 +316,9 @@ fn summarize(outcome: &LiveOutcome, live: Live<'_>, quiet: bool) -> Result<(), F
         say(quiet, &take.to_string());
     }
     finish_streams(live.streams, quiet)?;
+    if !outcome.faults.is_empty() {
+        return Err(miette!("{}", outcome.faults.join("\n")).into());
+    }
     if outcome.interrupted {
         return Err(Failure::Stopped("stopped".to_owned()));
     }

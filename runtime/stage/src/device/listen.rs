@@ -15,7 +15,7 @@ const FIRST: Duration = Duration::from_millis(2500);
 const OTHERS: Duration = Duration::from_millis(400);
 
 /// Listens until nothing new is to be expected, at most three seconds; `stop` ends it early. Knobs come in order of their
-/// addresses. Their readings are heard again: boxes repeat themselves.
+/// addresses. Their readings are not kept: a knob is taken over from where it stands when it is heard next.
 pub fn listen(device: &mut dyn Device, clock: Clock, stop: &dyn Fn() -> bool) -> Vec<HeardKnob> {
     let mut addresses: Vec<u16> = Vec::new();
     let started_us = clock.now_us();

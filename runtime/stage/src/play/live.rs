@@ -67,6 +67,8 @@ pub struct LiveOutcome {
     pub missed: u64,
     /// Ended by Ctrl-C.
     pub interrupted: bool,
+    /// Recordings that could not be begun or finished. The show went on.
+    pub faults: Vec<String>,
 }
 
 /// Why the loop left a surface.
@@ -165,7 +167,7 @@ impl Live<'_> {
     /// Plays until it is over.
     ///
     /// # Errors
-    /// A take that cannot be begun or finished; controls that the map's basis does not know.
+    /// The take that was to be recorded from the first frame on cannot be begun; controls that the map's basis does not know.
     pub fn run(
         &mut self,
         map: &ControlMap<'_>,
@@ -179,11 +181,19 @@ impl Live<'_> {
         let mut pace = Pace::new(self.clock, self.fps);
         let mut events = Vec::with_capacity(EVENTS);
         let mut wanted = self.record.clone();
+        let mut asked_later = false;
         loop {
             let mut knobs = vec![KnobState::default(); layout.knob_count];
             let mut slots = vec![SlotState::default(); layout.slot_count];
             let mut surface = ControlSurface::new(*map, settings, &mut knobs, &mut slots).into_diagnostic()?;
-            let file = wanted.take().map(|path| TakeFile::create(&path)).transpose()?;
+            let file = match wanted.take().map(|path| TakeFile::create(&path)).transpose() {
+                // Asked for in the middle of a show, which must not end for it.
+                Err(report) if asked_later => {
+                    outcome.faults.push(report.to_string());
+                    None
+                }
+                created => created?,
+            };
             let mut buffer = vec![0; CHUNK_BYTES];
             let mut take = match &file {
                 None => None,
@@ -212,6 +222,7 @@ impl Live<'_> {
                 carried: &mut carried,
                 checksum: WeightsChecksum::default(),
                 whole: &mut outcome.checksum,
+                fault: outcome.faults.last().map(String::as_str),
                 rates: Rates::default(),
                 words_us: 0,
             };
@@ -222,15 +233,17 @@ impl Live<'_> {
                 take.finish();
             }
             let was_recording = file.is_some();
-            if let Some(file) = file {
-                let path = file.finish()?;
-                outcome.takes.push(TakeSummary { path, frames: checksum });
+            match file.map(TakeFile::finish) {
+                None => {}
+                Some(Ok(path)) => outcome.takes.push(TakeSummary { path, frames: checksum }),
+                Some(Err(report)) => outcome.faults.push(report.to_string()),
             }
             if end == End::Over {
                 break;
             }
             if !was_recording {
                 wanted = Some(free_name(&self.record_later));
+                asked_later = true;
             }
         }
         outcome.missed = pace.missed();
@@ -258,6 +271,8 @@ struct Segment<'p, 'l, 'm, 's, 'b, S: FnMut(&[u8])> {
     carried: &'p mut Carried,
     checksum: WeightsChecksum,
     whole: &'p mut WeightsChecksum,
+    /// What went wrong with the last recording.
+    fault: Option<&'p str>,
     rates: Rates,
     words_us: u64,
 }
@@ -371,8 +386,9 @@ impl<S: FnMut(&[u8])> Segment<'_, '_, '_, '_, '_, S> {
         {
             take.flush();
         }
+        let due = now_us.saturating_sub(self.words_us) >= WORDS_US || self.words_us == 0;
         let mut words = None;
-        if now_us.saturating_sub(self.words_us) >= WORDS_US || self.words_us == 0 {
+        if due {
             self.words_us = now_us.max(1);
             words = self.live.device.as_ref().map(|device| device.device_status());
             if let Some(device) = &self.live.device {
@@ -383,6 +399,7 @@ impl<S: FnMut(&[u8])> Segment<'_, '_, '_, '_, '_, S> {
                 let named = |stream: &Stream| stream.fault().map(|fault| format!("a stream ended: {fault}"));
                 self.live.streams.iter().find_map(named)
             });
+            trouble = trouble.or_else(|| self.fault.map(str::to_owned));
         }
         let dropped = self.live.streams.iter().map(Stream::dropped).sum();
         let frames = self.whole.frames();
@@ -393,8 +410,8 @@ impl<S: FnMut(&[u8])> Segment<'_, '_, '_, '_, '_, S> {
             snapshot.frames = frames;
             snapshot.missed = missed;
             snapshot.stream_dropped = dropped;
-            if let Some(words) = words {
-                snapshot.device = Some(words);
+            if due {
+                snapshot.device = words;
                 snapshot.trouble = trouble;
             }
             match (self.file, &mut snapshot.recording) {
