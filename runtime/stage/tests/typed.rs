@@ -90,7 +90,7 @@ fn raw_frames_leave_by_standard_output() {
     let (vertices, faces) = (number(8), number(12));
     let frame = 8 + 12 * vertices;
     let frames = &ran.out[16 + 12 * faces..];
-    assert!(frames.len() % frame == 0 && frames.len() / frame > 3);
+    assert!(frames.len().is_multiple_of(frame) && frames.len() / frame > 3);
     assert!(frames[8..frame] != frames[frames.len() - frame + 8..], "it moved");
 }
 

@@ -1,6 +1,7 @@
 //! Refusals of a file, with the place in it: file, line and column in one line, and the lines themselves for a terminal.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use miette::{Diagnostic, NamedSource, SourceSpan};
 
@@ -21,7 +22,7 @@ pub struct ConfigError {
     #[help]
     help: Option<String>,
     #[source_code]
-    source_code: NamedSource<String>,
+    source_code: Arc<NamedSource<String>>,
     #[label("here")]
     span: SourceSpan,
 }
@@ -39,7 +40,7 @@ impl ConfigError {
             column: before[line_start..].chars().count() + 1,
             message: fault.message,
             help: fault.help,
-            source_code: NamedSource::new(&file, text.to_owned()),
+            source_code: Arc::new(NamedSource::new(&file, text.to_owned())),
             // A table's span is all of it; its first line is enough to point at.
             span: (start, text[start..end].find('\n').unwrap_or(end - start)).into(),
             file,

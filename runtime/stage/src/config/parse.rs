@@ -46,11 +46,14 @@ pub(super) fn parse(text: &str) -> Result<KnobsFile, Fault> {
 }
 
 fn device_choice(mut keys: Keys<'_>) -> Result<DeviceChoice, Fault> {
-    let mut device = DeviceChoice::default();
-    device.serial = keys.text("serial")?.map(|found| Found {
+    let serial = keys.text("serial")?.map(|found| Found {
         value: found.value.to_owned(),
         span: found.span,
     });
+    let mut device = DeviceChoice {
+        serial,
+        ..DeviceChoice::default()
+    };
     let midi = keys.text("midi")?;
     let osc = keys.whole_or_text("osc")?;
     let spans = [
@@ -287,9 +290,13 @@ fn read_knob(mut keys: Keys<'_>, midi: &mut MidiSettings, under: Smoothing) -> R
     let step = keys.number("step", 1e-6..=1.0)?.map(|found| found.value);
     let smoothing = smoothing(&mut keys, under)?;
     if let Some(coding) = keys.word("encoder", &CODINGS)? {
-        if let Place::Number(address) = place.value {
-            midi.set_coding(address, coding);
-        }
+        let Place::Number(address) = place.value else {
+            return Err(Fault::new(
+                place.span,
+                "`encoder` is for MIDI controllers, and this knob goes by a name",
+            ));
+        };
+        midi.set_coding(address, coding);
     }
     let mut controls = Vec::new();
     let own = keys

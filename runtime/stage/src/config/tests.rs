@@ -158,6 +158,10 @@ fn numbers_that_nothing_reads_are_refused() {
         "knobs.toml:3:7: a second device is named: one plays at a time (keep one of `serial`, `midi` and `osc`)"
     );
     assert_eq!(
+        refused("[[knob]]\nknob = \"jaw\"\ncomponent = \"c0\"\nencoder = \"signed-bit\""),
+        "knobs.toml:2:8: `encoder` is for MIDI controllers, and this knob goes by a name"
+    );
+    assert_eq!(
         refused("[tree]\nfirst_knob = 2"),
         "knobs.toml:2:14: `first_knob` needs `coarse` and `fine` beside it"
     );

@@ -1,7 +1,8 @@
 //! Streams into files and sockets, read back as docs/streams.md says.
 
+use core::net::Ipv4Addr;
 use core::time::Duration;
-use std::net::{Ipv4Addr, UdpSocket};
+use std::net::UdpSocket;
 
 use sinew_formats::interchange::read_sequence;
 

@@ -1,8 +1,9 @@
 //! The writing end of a stream, on its thread.
 
+use core::net::Ipv4Addr;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
-use std::net::{Ipv4Addr, UdpSocket};
+use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
 
 use miette::{IntoDiagnostic, Report, WrapErr};

@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use sinew_runtime::Basis;
-use sinew_runtime::input::{Binding, Button, Centre, Command, Curve, OnPage, Response, SurfaceSettings, TreePages};
+use sinew_runtime::input::{Binding, Button, Command, OnPage, Response, SurfaceSettings, TreePages};
 
 use super::{HeardKnob, WiredKnob, Wiring, split};
 use crate::calibration::DeviceCalibration;
@@ -338,8 +338,8 @@ fn response(feel: Feel) -> Response {
         minimum: None,
         maximum: None,
         inverted: feel.inverted.unwrap_or(false),
-        centre: feel.centre.unwrap_or(Centre::default()),
-        curve: feel.curve.unwrap_or(Curve::default()),
+        centre: feel.centre.unwrap_or_default(),
+        curve: feel.curve.unwrap_or_default(),
         slew: feel.slew,
     }
 }
