@@ -1,6 +1,7 @@
 //! A snapshot in words: what a knob waits for, what the device is and what is wrong. The same for the terminal view and the
 //! status lines.
 
+use sinew_runtime::input::protocol::Recognition;
 use sinew_runtime::input::{DeviceStatus, Direction, Link, TakeoverState};
 
 use crate::snapshot::{Labels, Snapshot};
@@ -29,10 +30,14 @@ pub fn device(status: &DeviceStatus) -> String {
         Link::Open => status.port.clone(),
         Link::Lost => format!("{} is gone", status.port),
     };
-    if let Some(baud) = status.baud {
+    if let (Some(baud), Link::Open) = (status.baud, status.link) {
         text.push_str(&format!(" at {baud} baud"));
     }
-    text.push_str(&format!(", {}", status.recognition));
+    text.push_str(&match status.recognition {
+        // How sure it is by all that came, not by the first bytes alone.
+        Recognition::Found(finding) => format!(", {}, {} % sure", finding.protocol.words(), status.confidence),
+        other => format!(", {other}"),
+    });
     if let Some(firmware) = &status.firmware {
         text.push_str(&format!(", firmware {firmware}"));
     }
@@ -87,7 +92,8 @@ pub fn warnings(snapshot: &Snapshot) -> Vec<String> {
     }
     if let Some(device) = &snapshot.device {
         if let (Some(error), Link::Waiting | Link::Lost) = (&device.last_error, device.link) {
-            warnings.push(error.clone());
+            // A list of ports has lines of its own; a warning has one.
+            warnings.push(error.split_whitespace().collect::<Vec<_>>().join(" "));
         }
         let counters = &device.counters;
         if counters.bad > 0 {
