@@ -7,9 +7,10 @@ mod late;
 mod no_jump;
 mod protocols;
 
+use core::time::Duration;
 use std::path::Path;
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use sinew_runtime::input::{
     Clock, ControlSource, KnobEvent, Protocol, Reading, SerialSelector, SerialSettings, SerialSource, SourceEvent,
