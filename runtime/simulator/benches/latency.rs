@@ -1,9 +1,10 @@
 //! From the write of a line's last byte on a pseudo-terminal to the event in the frame's hands, and what a poll costs.
 //! `cargo bench -p sinew-simulator --bench latency`
 
-use std::hint::black_box;
+use core::hint::black_box;
+use core::time::Duration;
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use sinew_runtime::input::{Clock, ControlSource, Protocol, SerialSelector, SerialSettings, SerialSource};
 use sinew_simulator::Port;
@@ -52,13 +53,13 @@ fn main() {
         }
         latency.push(sent.elapsed().as_secs_f64() * 1e6);
         let begun = Instant::now();
-        source.poll(clock.now_us(), &mut |_, event| drop(black_box(event)));
+        source.poll(clock.now_us(), &mut |_, event| _ = black_box(event));
         idle.push(begun.elapsed().as_secs_f64() * 1e9);
         // A frame later, with eight events waiting.
         port.send(line.as_bytes());
         thread::sleep(Duration::from_millis(2));
         let begun = Instant::now();
-        source.poll(clock.now_us(), &mut |_, event| drop(black_box(event)));
+        source.poll(clock.now_us(), &mut |_, event| _ = black_box(event));
         full.push(begun.elapsed().as_secs_f64() * 1e9);
     }
     quantiles("last byte written -> time stamp in the reader thread", "us", stamped);

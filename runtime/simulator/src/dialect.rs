@@ -1,6 +1,6 @@
 //! What the simulated box speaks: readings -> the bytes of one report, in each of the languages that knob boxes have.
 
-use std::fmt;
+use core::fmt;
 
 use sinew_runtime::input::Protocol;
 use sinew_runtime::input::protocol::{FrameKind, write_frame};
@@ -209,7 +209,7 @@ impl Speaker {
     }
 
     fn packets(&mut self, readings: &[u16], out: &mut Vec<u8>) {
-        if std::mem::take(&mut self.hello) {
+        if core::mem::take(&mut self.hello) {
             // Few enough knobs a frame that their names fit.
             for first in (0..readings.len()).step_by(12) {
                 self.hello_frame(first, (readings.len() - first).min(12), readings.len(), out);
@@ -231,7 +231,7 @@ impl Speaker {
 
     fn hello_frame(&mut self, first: usize, count: usize, knob_count: usize, out: &mut Vec<u8>) {
         const FIRMWARE: &str = "simulated 1";
-        let started = u8::from(std::mem::take(&mut self.started));
+        let started = u8::from(core::mem::take(&mut self.started));
         let mut payload = vec![
             started,
             knob_count as u8,

@@ -1,9 +1,9 @@
 //! The box itself, without a port: hands and faults in, bytes out. Its time is the caller's, so the same seed and the same
 //! commands give the same bytes, however the caller's steps fall.
 
+use core::fmt;
+use core::time::Duration;
 use std::collections::VecDeque;
-use std::fmt;
-use std::time::Duration;
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -54,7 +54,7 @@ pub enum BoxError {
     },
 }
 
-impl std::error::Error for BoxError {}
+impl core::error::Error for BoxError {}
 
 impl fmt::Display for BoxError {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -67,7 +67,7 @@ impl fmt::Display for BoxError {
 
 const RATE_MAX: u32 = 100_000;
 /// A wandering knob takes this long from one place to the next, s.
-const WANDER_S: std::ops::Range<f32> = 0.8..3.0;
+const WANDER_S: core::ops::Range<f32> = 0.8..3.0;
 
 /// What the box does at its port.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -312,13 +312,13 @@ impl KnobBox {
         if self.plug_at_us.is_some() || now_us < self.silent_until_us {
             return;
         }
-        let mut bytes = std::mem::take(&mut self.bytes);
+        let mut bytes = core::mem::take(&mut self.bytes);
         bytes.clear();
         if !self.powered {
             self.powered = true;
             self.speaker.power_up(&mut bytes);
         }
-        for _ in 0..std::mem::take(&mut self.garbage) {
+        for _ in 0..core::mem::take(&mut self.garbage) {
             bytes.push(self.random.random());
         }
         let start = bytes.len();

@@ -1,11 +1,11 @@
 //! The box's end of the cable: a pseudo-terminal, and a link to it whose path stays the same when the cable is pulled and
 //! put back, as a host needs it to find the box again.
 
+use core::time::Duration;
 use std::fs;
 use std::io::{self, Read, Write};
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use serialport::{SerialPort, TTYPort};
 
@@ -27,10 +27,10 @@ pub enum PortError {
     NoLink(PathBuf, io::Error),
 }
 
-impl std::error::Error for PortError {}
+impl core::error::Error for PortError {}
 
-impl std::fmt::Display for PortError {
-    fn fmt(&self, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl core::fmt::Display for PortError {
+    fn fmt(&self, out: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::NoTerminal(error) => write!(out, "the system gives no pseudo-terminal: {error}"),
             Self::Occupied(path) => write!(

@@ -1,8 +1,8 @@
 //! What can be asked of a simulated box, as text: one command a line, at its time. Read by the command line, run by
 //! [`crate::KnobBox`].
 
-use std::fmt;
-use std::time::Duration;
+use core::fmt;
+use core::time::Duration;
 
 /// What the box shall do or suffer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,7 +80,7 @@ pub struct ScriptError {
     pub message: String,
 }
 
-impl std::error::Error for ScriptError {}
+impl core::error::Error for ScriptError {}
 
 impl fmt::Display for ScriptError {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {

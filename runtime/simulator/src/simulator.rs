@@ -1,10 +1,11 @@
 //! The box at its port, in real time: on the caller's thread, or on one of its own.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, Ordering};
+use core::time::Duration;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use crate::knob_box::{KnobBox, Output};
 use crate::port::{Port, PortError};

@@ -7,9 +7,10 @@ mod late;
 mod no_jump;
 mod protocols;
 
+use core::time::Duration;
 use std::path::Path;
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use sinew_runtime::input::{
     Clock, ControlSource, KnobEvent, Protocol, Reading, SerialSelector, SerialSettings, SerialSource, SourceEvent,
@@ -58,6 +59,11 @@ impl Bench {
         let running = Simulator::new(KnobBox::new(box_settings).unwrap(), port).spawn();
         let clock = Clock::start();
         let source = SerialSource::open(selector(&path), settings, clock).unwrap();
+        // An encoder's steps are counted from where it stands at its first word.
+        let begun = Instant::now();
+        while running.status().sent_bytes + running.status().lost_bytes == 0 && begun.elapsed() < PATIENCE {
+            thread::sleep(Duration::from_millis(1));
+        }
         Self {
             clock,
             source,

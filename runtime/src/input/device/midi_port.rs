@@ -257,3 +257,23 @@ fn open(list: &MidiInput, wanted: &str, known: Option<&str>, feeder: &SharedFeed
         _connection: connection,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_port_that_is_not_there_is_named_with_those_that_are() {
+        let wanted = "No Such Box";
+        let error = MidiSource::open(wanted, MidiPortSettings::default(), Clock::start()).unwrap_err();
+        match (midi_ports(), &error) {
+            (Ok(ports), MidiError::Missing { found, .. }) => {
+                assert_eq!(found, &ports);
+                assert!(error.to_string().contains(&wanted.to_lowercase()), "{error}");
+            }
+            // A machine without a sequencer says so, and does not wait for one.
+            (Err(listed), MidiError::NoMidi { .. }) => assert_eq!(listed, error),
+            other => panic!("{other:?}"),
+        }
+    }
+}
