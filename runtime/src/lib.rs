@@ -23,7 +23,7 @@
 // Only the kernels of one instruction set may allow it, each in a file of its own.
 #![deny(unsafe_code)]
 
-#[cfg(test)]
+#[cfg(any(test, feature = "std"))]
 extern crate std;
 
 mod basis;

@@ -30,6 +30,6 @@ pub use npy::NpyArray;
 pub use read::{SequenceRead, read_sequence};
 pub use sequence::MeshSequence;
 pub use write::{
-    WriteError, write_npy_f32, write_npy_u32, write_npy_vertices, write_obj, write_ply, write_sequence_npy,
-    write_sequence_obj,
+    WriteError, write_npy_f32, write_npy_matrix, write_npy_u32, write_npy_vertices, write_obj, write_ply,
+    write_sequence_npy, write_sequence_obj,
 };

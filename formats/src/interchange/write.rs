@@ -122,6 +122,18 @@ pub fn write_npy_vertices(path: &Path, positions: &[[f32; 3]]) -> Result<(), Wri
     })
 }
 
+/// Writes rows of `columns` numbers as an npy array of f32 `[rows][columns]`. Without columns there are no rows.
+///
+/// Errors: `Io`; `LengthDiffers` if the last row is cut.
+pub fn write_npy_matrix(path: &Path, values: &[f32], columns: usize) -> Result<(), WriteError> {
+    let rows = values.len() / columns.max(1);
+    check_length(path, "the matrix", Some(values.len()), rows * columns)?;
+    write_file(path, |out| {
+        write_npy_header(out, "<f4", &[rows, columns])?;
+        write_f32(out, values)
+    })
+}
+
 /// Writes triangles as an npy array of u32 `[F][3]`.
 ///
 /// Errors: `Io`.
