@@ -48,7 +48,8 @@ pub(crate) fn blend_block<'p>(
     pre
 }
 
-fn components(block: &BakedBlock) -> core::ops::Range<usize> {
+/// The block's components.
+pub(crate) fn components(block: &BakedBlock) -> core::ops::Range<usize> {
     let first = block.first_component as usize;
     first..first + block.component_count as usize
 }

@@ -71,7 +71,7 @@ pub(crate) fn gradient_tangent(scales: FeatureScales, x: &Features, dx: &Feature
 }
 
 /// `sin(t) / t` and `(1 - cos t) / t^2` for the squared angle `t^2`.
-fn rodrigues(angle_squared: f32) -> (f32, f32) {
+pub(super) fn rodrigues(angle_squared: f32) -> (f32, f32) {
     if angle_squared < SMALL_ANGLE_SQUARED {
         return (1.0 - angle_squared / 6.0, 0.5 - angle_squared / 24.0);
     }
