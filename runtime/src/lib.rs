@@ -20,13 +20,16 @@
 //! # }
 //! ```
 #![no_std]
-// Only the kernels of one instruction set may allow it, each in a file of its own.
+// Only the kernels of one instruction set may allow it, each in a file of its own, and the batch's shared slice.
 #![deny(unsafe_code)]
 
 #[cfg(test)]
 extern crate std;
 
 mod basis;
+// Threads need compare-and-swap.
+#[cfg(target_has_atomic = "ptr")]
+mod batch;
 mod blend;
 mod controls;
 mod decode;
@@ -45,6 +48,8 @@ mod workspace;
 mod fixture;
 
 pub use basis::{Basis, Component};
+#[cfg(target_has_atomic = "ptr")]
+pub use batch::{Batch, Instance};
 pub use controls::Controls;
 pub use error::{Buffer, ControlError, FrameError, WorkspaceError};
 pub use frame::{Frame, FrameOutcome};

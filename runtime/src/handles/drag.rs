@@ -120,14 +120,13 @@ impl Drag<'_, '_, '_> {
 
 impl Handles<'_> {
     /// Takes `weights` as the start and sees to it that the held vertices are known there.
-    fn begin(
-        &mut self,
-        basis: &Basis<'_>,
-        weights: &[f32],
-        workspace: &mut Workspace<'_>,
-    ) -> Result<(), HandleError> {
+    fn begin(&mut self, basis: &Basis<'_>, weights: &[f32], workspace: &mut Workspace<'_>) -> Result<(), HandleError> {
         self.memory.start.copy_from_slice(weights);
-        let is_known = self.is_evaluated && weights.iter().zip(&*self.memory.evaluated).all(|(&w, &e)| flushed(w) == e);
+        let is_known = self.is_evaluated
+            && weights
+                .iter()
+                .zip(&*self.memory.evaluated)
+                .all(|(&w, &e)| flushed(w) == e);
         if !is_known {
             self.memory.trial.copy_from_slice(weights);
             if !self.evaluate(basis, workspace) {
@@ -200,7 +199,10 @@ impl Handles<'_> {
             gram: &mut memory.gram[..rows * rows],
             multipliers: &mut memory.multipliers[..rows],
         };
-        let levels = (0..basis.block_count()).map(|b| basis.block(b).level).max().unwrap_or(0);
+        let levels = (0..basis.block_count())
+            .map(|b| basis.block(b).level)
+            .max()
+            .unwrap_or(0);
         for level in 0..=levels {
             reach.pass(self.caution * LEVEL_RIDGE, |k| basis.component(k).level == level);
         }

@@ -82,10 +82,7 @@ impl fmt::Display for HandleError {
                 )
             }
             Self::TargetNotFinite { vertex } => {
-                write!(
-                    out,
-                    "the target of vertex {vertex} is not finite; the last one stays"
-                )
+                write!(out, "the target of vertex {vertex} is not finite; the last one stays")
             }
             Self::NotFinite { vertex } => {
                 write!(

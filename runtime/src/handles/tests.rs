@@ -160,7 +160,13 @@ fn a_handle_that_is_not_moved_holds_its_vertex() {
     let mut target = start[moved];
     target[2] += 0.05 * size;
     let alone = drag(&basis, &[(moved, target)], &[], &WEIGHTS, UPDATES_MAX);
-    let both = drag(&basis, &[(moved, target), (held, start[held])], &[], &WEIGHTS, UPDATES_MAX);
+    let both = drag(
+        &basis,
+        &[(moved, target), (held, start[held])],
+        &[],
+        &WEIGHTS,
+        UPDATES_MAX,
+    );
     let mut slip = |updates: Vec<(Vec<f32>, DragReport)>| {
         let played = pose(&basis, &updates.last().unwrap().0, &mut workspace);
         (distance(&played[held], &start[held]), distance(&played[moved], &target))
@@ -172,7 +178,10 @@ fn a_handle_that_is_not_moved_holds_its_vertex() {
         slip_held < 0.5 * slip_alone,
         "held {slip_held}, free it slips {slip_alone}"
     );
-    assert!(left < distance(&start[moved], &target), "and still the other comes nearer");
+    assert!(
+        left < distance(&start[moved], &target),
+        "and still the other comes nearer"
+    );
 }
 
 #[test]
@@ -232,11 +241,7 @@ fn without_handles_or_at_the_target_nothing_moves() {
 fn handles_come_and_go() {
     let package = Package::small(4);
     let basis = open(&package);
-    let (mut memory, mut own, mut other) = (
-        memory_for(&basis),
-        handles_memory(&basis, 3),
-        handles_memory(&basis, 2),
-    );
+    let (mut memory, mut own, mut other) = (memory_for(&basis), handles_memory(&basis, 3), handles_memory(&basis, 2));
     let mut workspace = workspace_in(&basis, &mut memory);
     let start = pose(&basis, &WEIGHTS, &mut workspace);
     let mut handles = Handles::new(&basis, 3, &mut own).unwrap();
@@ -296,15 +301,9 @@ fn validity() {
         Err(HandleError::ForeignWorkspace)
     );
     assert_eq!(add(4, &basis, &mut workspace), Ok(()));
-    assert_eq!(
-        add(5, &basis, &mut workspace),
-        Err(HandleError::Full { capacity: 2 })
-    );
+    assert_eq!(add(5, &basis, &mut workspace), Err(HandleError::Full { capacity: 2 }));
     assert_eq!(handles.remove(5), Err(HandleError::NotHeld { vertex: 5 }));
-    assert_eq!(
-        handles.set_target(5, [0.0; 3]),
-        Err(HandleError::NotHeld { vertex: 5 })
-    );
+    assert_eq!(handles.set_target(5, [0.0; 3]), Err(HandleError::NotHeld { vertex: 5 }));
     let before = handles.targets()[0];
     for bad in [f32::NAN, f32::INFINITY] {
         let refused = handles.set_target(3, [0.0, bad, 0.0]);
@@ -351,6 +350,9 @@ fn validity() {
         controls.set_unclamped(k, f32::MAX).unwrap();
     }
     let refused = run(&basis, &mut controls, &mut workspace);
-    assert!(matches!(refused, Err(HandleError::NotFinite { vertex: 3 | 4 })), "{refused:?}");
+    assert!(
+        matches!(refused, Err(HandleError::NotFinite { vertex: 3 | 4 })),
+        "{refused:?}"
+    );
     assert_eq!(controls.weights()[..2], [f32::MAX; 2]);
 }
