@@ -1,9 +1,10 @@
-//! The opened package: a checked view of the caller's bytes, nothing copied.
+//! The opened package and its tiers: checked views of the caller's bytes, nothing copied.
 
 use core::fmt;
 
-use sinew_formats::package::{BakedBlock, BakedView, FEATURE_COUNT, NONE, OpenError};
+use sinew_formats::package::{BakedBlock, BakedView, FEATURE_COUNT, NONE, OpenError, TierView};
 
+use crate::simd::scalar::gradient::FeatureScales;
 use crate::simd::scalar::poisson::{Factor, Rings};
 
 /// A baked package, checked. Borrows the bytes; cheap to copy; may be shared between threads, each with its own workspace.
@@ -109,7 +110,7 @@ impl<'a> Basis<'a> {
 
     /// Rest shape. Shape: `[V]`, **solver** order, units of the source.
     pub fn rest_positions(&self) -> &'a [[f32; 3]] {
-        self.view.rest_positions()
+        self.view.exact().rest_positions()
     }
 
     /// Where a source vertex stands in solver order. Shape: `[V]`.
@@ -132,45 +133,85 @@ impl<'a> Basis<'a> {
         self.view.stretch_scale()
     }
 
+    /// The tier whose nodes are the vertices.
+    pub(crate) fn exact(&self) -> Tier<'a> {
+        Tier {
+            basis: *self,
+            nodes: self.view.exact(),
+        }
+    }
+}
+
+/// One tier of a basis, and what all tiers share: all that blend, decode and solve read. N nodes; N = V in the exact tier.
+#[derive(Clone, Copy)]
+pub(crate) struct Tier<'a> {
+    basis: Basis<'a>,
+    nodes: TierView<'a>,
+}
+
+impl<'a> Tier<'a> {
+    /// N.
+    pub(crate) fn node_count(&self) -> usize {
+        self.nodes.node_count()
+    }
+
+    pub(crate) fn block_count(&self) -> usize {
+        self.basis.block_count()
+    }
+
     pub(crate) fn block(&self, b: usize) -> BakedBlock {
-        self.view.block(b)
+        self.basis.view.block(b)
     }
 
-    /// A block's vertices, solver order.
-    pub(crate) fn support(&self, block: &BakedBlock) -> &'a [u32] {
-        section(self.view.support(), block.first_support, block.support_count)
+    /// The block that component `k` is a latent of.
+    pub(crate) fn block_of(&self, k: usize) -> usize {
+        self.basis.view.component(k).block as usize
     }
 
-    /// A component's entries.
+    /// What a network feature means.
+    pub(crate) fn scales(&self) -> FeatureScales {
+        FeatureScales {
+            rotation: self.basis.rotation_scale(),
+            stretch: self.basis.stretch_scale(),
+        }
+    }
+
+    /// Rest shape of the nodes. Shape: `[N]`, solver order.
+    pub(crate) fn rest_positions(&self) -> &'a [[f32; 3]] {
+        self.nodes.rest_positions()
+    }
+
+    /// Nodes of block `b`, solver order.
+    pub(crate) fn support(&self, b: usize) -> &'a [u32] {
+        self.nodes.support_of(b)
+    }
+
+    /// Entries of component `k`.
     pub(crate) fn entries(&self, k: usize) -> Entries<'a> {
-        let record = self.view.component(k);
+        let (slots, values) = self.nodes.entries_of(k);
         Entries {
-            slots: section(self.view.entry_slots(), record.first_entry, record.entry_count),
-            values: section(self.view.entry_values(), record.first_entry, record.entry_count),
-            scale: record.value_scale,
+            slots,
+            values,
+            scale: self.basis.view.component(k).value_scale,
         }
     }
 
     pub(crate) fn rings(&self) -> Rings<'a> {
         Rings {
-            offsets: self.view.ring_offsets(),
-            neighbours: self.view.ring(),
-            weights: self.view.ring_weights(),
+            offsets: self.nodes.ring_offsets(),
+            neighbours: self.nodes.ring(),
+            weights: self.nodes.ring_weights(),
         }
     }
 
     pub(crate) fn factor(&self) -> Factor<'a> {
         Factor {
-            offsets: self.view.factor_offsets(),
-            rows: self.view.factor_rows(),
-            values: self.view.factor_values(),
-            inverse_pivots: self.view.inverse_pivots(),
+            offsets: self.nodes.factor_offsets(),
+            rows: self.nodes.factor_rows(),
+            values: self.nodes.factor_values(),
+            inverse_pivots: self.nodes.inverse_pivots(),
         }
     }
-}
-
-fn section<T>(whole: &[T], first: u32, count: u32) -> &[T] {
-    &whole[first as usize..][..count as usize]
 }
 
 /// A component's sparse values: at place `slots[n]` of its block's support, `scale * values[n]`.

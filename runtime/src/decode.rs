@@ -1,18 +1,10 @@
 //! Decode: features to deformation gradients, at the scales of the package.
 
-use crate::basis::Basis;
+use crate::basis::Tier;
 use crate::simd::scalar::blend::Features;
-use crate::simd::scalar::gradient::{self, FeatureScales};
+use crate::simd::scalar::gradient;
 
-/// The package's feature scales.
-pub(crate) fn scales(basis: &Basis<'_>) -> FeatureScales {
-    FeatureScales {
-        rotation: basis.rotation_scale(),
-        stretch: basis.stretch_scale(),
-    }
-}
-
-/// `D = T - I` of every vertex. Shape: both `[V]`.
-pub(crate) fn decode(basis: &Basis<'_>, features: &[Features], gradients: &mut [Features]) {
-    gradient::gradients(scales(basis), features, gradients);
+/// `D = T - I` of every node. Shape: both `[N]`.
+pub(crate) fn decode(tier: &Tier<'_>, features: &[Features], gradients: &mut [Features]) {
+    gradient::gradients(tier.scales(), features, gradients);
 }

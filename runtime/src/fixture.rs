@@ -6,7 +6,7 @@ use std::vec;
 use std::vec::Vec;
 
 use half::f16;
-use sinew_formats::package::{AlignedBytes, BakedBasis, BakedBlock, BakedComponent, NONE, write_baked};
+use sinew_formats::package::{AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedTier, NONE, write_baked};
 
 use crate::basis::Basis;
 use crate::simd::scalar::naive::Noise;
@@ -183,6 +183,7 @@ impl Package {
             (0..count).filter(|s| s % 2 == 0).collect(),
         ];
         let (mut blocks, mut components) = (Vec::new(), Vec::new());
+        let (mut support_offsets, mut entry_offsets) = (vec![0], vec![0]);
         let (mut support, mut slots, mut values) = (Vec::new(), Vec::new(), Vec::new());
         let names: Vec<String> = (0..Self::COMPONENTS).map(|k| format!("c{k}")).collect();
         for (b, (parent, component_count)) in [(NONE, 2), (0, 1), (1, 2)].into_iter().enumerate() {
@@ -191,52 +192,54 @@ impl Package {
                 parent_component: parent,
                 first_component: components.len() as u32,
                 component_count,
-                first_support: support.len() as u32,
-                support_count: supports[b].len() as u32,
                 bias: noise.features().map(|x| 0.3 * x),
             });
             for _ in 0..component_count {
                 let k = components.len();
-                let first_entry = slots.len() as u32;
                 for slot in 0..supports[b].len() as u32 {
                     if !(slot as usize + k).is_multiple_of(5) {
                         slots.push(slot);
                         values.push(noise.features().map(|x| f16::from_f32(0.125 * x).to_bits()));
                     }
                 }
+                entry_offsets.push(slots.len() as u32);
                 components.push(BakedComponent {
                     name: &names[k],
                     block: b as u32,
                     minimum: -1.0 - k as f32,
                     maximum: 1.5,
-                    first_entry,
-                    entry_count: slots.len() as u32 - first_entry,
                     value_scale: 4.0,
                 });
             }
             support.extend(&supports[b]);
+            support_offsets.push(support.len() as u32);
         }
         let factor = factorise(&grid.laplacian());
         let bytes = write_baked(&BakedBasis {
             compact_id: [7; 16],
-            rest_positions: &grid.rest,
             faces: &grid.faces,
             solver_from_vertex: &grid.solver_from_vertex,
             vertex_from_solver: &vertex_from_solver,
-            ring_offsets: &grid.offsets,
-            ring: &grid.ring,
-            ring_weights: &grid.weights,
-            factor_offsets: &factor.offsets,
-            factor_rows: &factor.rows,
-            factor_values: &factor.values,
-            inverse_pivots: &factor.inverse_pivots,
             rotation_scale: 1.5,
             stretch_scale: 0.4,
             blocks: &blocks,
             components: &components,
-            support: &support,
-            entry_slots: &slots,
-            entry_values: &values,
+            exact: BakedTier {
+                rest_positions: &grid.rest,
+                ring_offsets: &grid.offsets,
+                ring: &grid.ring,
+                ring_weights: &grid.weights,
+                factor_offsets: &factor.offsets,
+                factor_rows: &factor.rows,
+                factor_values: &factor.values,
+                inverse_pivots: &factor.inverse_pivots,
+                support_offsets: &support_offsets,
+                support: &support,
+                entry_offsets: &entry_offsets,
+                entry_slots: &slots,
+                entry_values: &values,
+            },
+            fast: None,
         })
         .unwrap();
         let rest_in_source_order = grid.solver_from_vertex.iter().map(|&s| grid.rest[s as usize]).collect();

@@ -65,14 +65,10 @@ impl Frame<'_> {
                 .iter_mut()
                 .zip(weights)
                 .for_each(|(to, from)| *to = from);
-            blend(
-                self.basis,
-                workspace.weights,
-                workspace.pre_activations,
-                workspace.features,
-            );
-            decode(self.basis, workspace.features, workspace.gradients);
-            solve(self.basis, workspace.gradients, workspace.displacement);
+            let tier = self.basis.exact();
+            blend(&tier, workspace.weights, workspace.pre_activations, workspace.features);
+            decode(&tier, workspace.features, workspace.gradients);
+            solve(&tier, workspace.gradients, workspace.displacement);
             FrameOutcome::Solved
         };
         let emitted = emit(self.basis, workspace.displacement, self.positions);

@@ -5,7 +5,6 @@ use sinew_formats::package::FEATURE_COUNT;
 
 use crate::basis::Basis;
 use crate::blend::blend_block;
-use crate::decode::scales;
 use crate::error::{Buffer, FrameError};
 use crate::normals::check_length;
 use crate::simd::scalar::blend::activate_tangent;
@@ -61,18 +60,20 @@ impl Tangent<'_> {
             solution,
             ..
         } = workspace;
-        let block = self.basis.block(self.basis.component(self.component).block);
+        let tier = self.basis.exact();
+        let b = tier.block_of(self.component);
+        let bias = tier.block(b).bias;
         // The features are the sum of all blocks; the tanh of this one needs its own blend back.
-        let pre = blend_block(self.basis, &block, weights, pre_activations);
-        let support = self.basis.support(&block);
-        let entries = self.basis.entries(self.component);
+        let pre = blend_block(&tier, b, weights, pre_activations);
+        let support = tier.support(b);
+        let entries = tier.entries(self.component);
         gradients.fill([0.0; FEATURE_COUNT]);
         for (&slot, value) in entries.slots.iter().zip(entries.values) {
             let v = support[slot as usize] as usize;
-            let dx = activate_tangent(&block.bias, &pre[slot as usize], value, entries.scale);
-            gradients[v] = gradient_tangent(scales(self.basis), &features[v], &dx);
+            let dx = activate_tangent(&bias, &pre[slot as usize], value, entries.scale);
+            gradients[v] = gradient_tangent(tier.scales(), &features[v], &dx);
         }
-        solve(self.basis, gradients, solution);
+        solve(&tier, gradients, solution);
         for (d, &v) in solution.iter().zip(self.basis.vertex_from_solver()) {
             if !d.iter().all(|x| x.is_finite()) {
                 self.displacement.fill([0.0; 3]);

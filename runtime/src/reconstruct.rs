@@ -46,11 +46,12 @@ impl Reconstruct<'_> {
         let Workspace {
             gradients, solution, ..
         } = workspace;
+        let tier = self.basis.exact();
         for (v, x) in self.features.iter().enumerate() {
             let s = self.basis.solver_from_vertex()[v] as usize;
-            decode(self.basis, core::slice::from_ref(x), &mut gradients[s..=s]);
+            decode(&tier, core::slice::from_ref(x), &mut gradients[s..=s]);
         }
-        solve(self.basis, gradients, solution);
+        solve(&tier, gradients, solution);
         emit(self.basis, solution, self.positions)
     }
 }

@@ -1,15 +1,15 @@
 //! Solve: deformation gradients to displacements, and those to positions in source order.
 
-use crate::basis::Basis;
+use crate::basis::{Basis, Tier};
 use crate::error::FrameError;
 use crate::simd::scalar::blend::Features;
 use crate::simd::scalar::poisson::{right_hand_side, substitute};
 use crate::simd::scalar::surface::scatter;
 
-/// Solves `L d = b(D)`. Shape: both `[V]`, solver order.
-pub(crate) fn solve(basis: &Basis<'_>, gradients: &[Features], displacement: &mut [[f32; 3]]) {
-    right_hand_side(&basis.rings(), basis.rest_positions(), gradients, displacement);
-    substitute(&basis.factor(), displacement);
+/// Solves `L d = b(D)`. Shape: both `[N]`, solver order.
+pub(crate) fn solve(tier: &Tier<'_>, gradients: &[Features], displacement: &mut [[f32; 3]]) {
+    right_hand_side(&tier.rings(), tier.rest_positions(), gradients, displacement);
+    substitute(&tier.factor(), displacement);
 }
 
 /// Writes rest shape plus displacement in source order.

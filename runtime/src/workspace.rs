@@ -39,16 +39,17 @@ impl WorkspaceLayout {
 /// Element counts of the buffers, in the order in which they lie in memory.
 struct Sections {
     components: usize,
-    vertices: usize,
+    nodes: usize,
     largest_support: usize,
 }
 
 impl Sections {
     fn of(basis: &Basis<'_>) -> Self {
-        let supports = (0..basis.block_count()).map(|b| basis.block(b).support_count as usize);
+        let tier = basis.exact();
+        let supports = (0..tier.block_count()).map(|b| tier.support(b).len());
         Self {
             components: basis.component_count(),
-            vertices: basis.vertex_count(),
+            nodes: tier.node_count(),
             largest_support: supports.max().unwrap_or(0),
         }
     }
@@ -56,9 +57,9 @@ impl Sections {
     /// The limits of the format keep this under a gigabyte, which fits 32 bits.
     fn size_bytes(&self) -> usize {
         section_bytes::<f32>(self.components)
-            + 2 * section_bytes::<[f32; FEATURE_COUNT]>(self.vertices)
+            + 2 * section_bytes::<[f32; FEATURE_COUNT]>(self.nodes)
             + section_bytes::<[f32; FEATURE_COUNT]>(self.largest_support)
-            + 2 * section_bytes::<[f32; 3]>(self.vertices)
+            + 2 * section_bytes::<[f32; 3]>(self.nodes)
     }
 }
 
@@ -118,11 +119,11 @@ impl<'w> Workspace<'w> {
         let memory = &mut memory[skipped..required_bytes];
         memory.fill(0);
         let (weights, memory) = carve(memory, sections.components);
-        let (features, memory) = carve(memory, sections.vertices);
-        let (displacement, memory) = carve(memory, sections.vertices);
+        let (features, memory) = carve(memory, sections.nodes);
+        let (displacement, memory) = carve(memory, sections.nodes);
         let (pre_activations, memory) = carve(memory, sections.largest_support);
-        let (gradients, memory) = carve(memory, sections.vertices);
-        let (solution, _) = carve(memory, sections.vertices);
+        let (gradients, memory) = carve(memory, sections.nodes);
+        let (solution, _) = carve(memory, sections.nodes);
         let basis_id = basis.id();
         Ok(Self {
             basis_id,

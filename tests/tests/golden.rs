@@ -4,7 +4,9 @@
 use core::fmt::{Debug, Write};
 use std::{env, fs, path::PathBuf};
 
-use sinew_formats::package::{BakedView, CompactView, FORMAT_VERSION, PackageKind, read_package, save_package};
+use sinew_formats::package::{
+    BakedView, CompactView, FIRST_VERSION, FORMAT_VERSION, OpenError, PackageKind, TierView, read_package, save_package,
+};
 use sinew_runtime::Basis;
 use sinew_tests::{baked_package, compact_package, play};
 
@@ -59,25 +61,35 @@ fn describe_baked(view: &BakedView<'_>) -> String {
     let mut text = String::new();
     let mut line = |name: &str, value: &dyn Debug| writeln!(text, "{name} = {value:?}").unwrap();
     line("compact_id", &view.compact_id());
-    line("rest_positions", &view.rest_positions());
     line("faces", &view.faces());
     line("solver_from_vertex", &view.solver_from_vertex());
     line("vertex_from_solver", &view.vertex_from_solver());
-    line("ring_offsets", &view.ring_offsets());
-    line("ring", &view.ring());
-    line("ring_weights", &view.ring_weights());
-    line("factor_offsets", &view.factor_offsets());
-    line("factor_rows", &view.factor_rows());
-    line("factor_values", &view.factor_values());
-    line("inverse_pivots", &view.inverse_pivots());
     line("rotation_scale", &view.rotation_scale());
     line("stretch_scale", &view.stretch_scale());
     view.blocks().for_each(|block| line("block", &block));
     view.components().for_each(|component| line("component", &component));
-    line("support", &view.support());
-    line("entry_slots", &view.entry_slots());
-    line("entry_values", &view.entry_values());
+    for (name, tier) in [("exact", Some(view.exact())), ("fast", view.fast())] {
+        if let Some(tier) = tier {
+            describe_tier(&tier, &mut |field, value| line(&format!("{name}.{field}"), value));
+        }
+    }
     text
+}
+
+fn describe_tier(tier: &TierView<'_>, line: &mut dyn FnMut(&str, &dyn Debug)) {
+    line("rest_positions", &tier.rest_positions());
+    line("ring_offsets", &tier.ring_offsets());
+    line("ring", &tier.ring());
+    line("ring_weights", &tier.ring_weights());
+    line("factor_offsets", &tier.factor_offsets());
+    line("factor_rows", &tier.factor_rows());
+    line("factor_values", &tier.factor_values());
+    line("inverse_pivots", &tier.inverse_pivots());
+    line("support_offsets", &tier.support_offsets());
+    line("support", &tier.support());
+    line("entry_offsets", &tier.entry_offsets());
+    line("entry_slots", &tier.entry_slots());
+    line("entry_values", &tier.entry_values());
 }
 
 #[test]
@@ -99,7 +111,7 @@ fn golden_packages_hold_what_is_written_beside_them() {
     if updating() {
         the_writer_still_writes_the_golden_bytes();
     }
-    for version in 1..=FORMAT_VERSION {
+    for version in FIRST_VERSION..=FORMAT_VERSION {
         let compact = read_package(&golden(version, "compact.sinew")).unwrap();
         let baked = read_package(&golden(version, "baked.sinew")).unwrap();
         assert_eq!(PackageKind::of(&compact), Ok(PackageKind::Compact));
@@ -113,11 +125,26 @@ fn golden_packages_hold_what_is_written_beside_them() {
 }
 
 #[test]
+fn packages_of_versions_that_were_never_released_are_refused_by_name() {
+    for version in 1..FIRST_VERSION {
+        let refused = OpenError::UnsupportedVersion {
+            found: version,
+            first: FIRST_VERSION,
+            latest: FORMAT_VERSION,
+        };
+        let compact = read_package(&golden(version, "compact.sinew")).unwrap();
+        let baked = read_package(&golden(version, "baked.sinew")).unwrap();
+        assert_eq!(CompactView::open(&compact).err(), Some(refused));
+        assert_eq!(Basis::open(&baked).err(), Some(refused));
+    }
+}
+
+#[test]
 fn golden_packages_play_as_recorded() {
     if updating() {
         the_writer_still_writes_the_golden_bytes();
     }
-    for version in 1..=FORMAT_VERSION {
+    for version in FIRST_VERSION..=FORMAT_VERSION {
         let bytes = read_package(&golden(version, "baked.sinew")).unwrap();
         let basis = Basis::open(&bytes).unwrap();
         let [positions, _] = play(&basis, |k| WEIGHTS[k]).unwrap();

@@ -4,7 +4,8 @@
 use rand::{Rng, RngCore, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use sinew_formats::package::{
-    AlignedBytes, BakedView, CompactView, HEADER_BYTES, Header, MAGIC, OpenError, PAYLOAD_ALIGNMENT, PackageKind,
+    AlignedBytes, BakedView, CompactView, FIRST_VERSION, FORMAT_VERSION, HEADER_BYTES, Header, MAGIC, OpenError,
+    PAYLOAD_ALIGNMENT, PackageKind,
 };
 use sinew_runtime::{Basis, FrameError};
 use sinew_tests::{baked_package, compact_package, play};
@@ -122,7 +123,7 @@ fn every_misaligned_start_is_refused() {
 #[test]
 fn other_versions_are_refused_by_name() {
     for (kind, mut package) in packages() {
-        for version in [0, 2, u16::MAX] {
+        for version in [0, FIRST_VERSION - 1, FORMAT_VERSION + 1, u16::MAX] {
             let mut header = Header::read(&compact_package()).unwrap();
             (header.format_version, header.oldest_reader) = (version, version);
             package.as_mut_slice()[..HEADER_BYTES].copy_from_slice(&header.to_bytes());

@@ -13,39 +13,15 @@ use super::FEATURE_COUNT;
 pub struct BakedBasis<'a> {
     /// Content id of the compact package this was baked from.
     pub compact_id: [u8; 16],
-    /// Rest shape in **solver** order. Shape: `[V]`.
-    #[rkyv(with = InlineAsBox)]
-    pub rest_positions: &'a [[f32; 3]],
     /// Triangles in **source** order. Shape: `[F]`.
     #[rkyv(with = InlineAsBox)]
     pub faces: &'a [[u32; 3]],
-    /// Shape: `[V]`, a permutation.
+    /// Where a vertex stands in the exact tier. Shape: `[V]`, a permutation.
     #[rkyv(with = InlineAsBox)]
     pub solver_from_vertex: &'a [u32],
     /// Shape: `[V]`, its inverse.
     #[rkyv(with = InlineAsBox)]
     pub vertex_from_solver: &'a [u32],
-    /// One-rings (with bridges) in solver order, compressed rows. Shape: `[V + 1]`, starts at 0, never falls.
-    #[rkyv(with = InlineAsBox)]
-    pub ring_offsets: &'a [u32],
-    /// Solver indices, ascending within a row, never the row itself. Shape: `[2 * edges]`.
-    #[rkyv(with = InlineAsBox)]
-    pub ring: &'a [u32],
-    /// Half the cotangent sum of each edge, non-negative, symmetric. Shape: that of `ring`.
-    #[rkyv(with = InlineAsBox)]
-    pub ring_weights: &'a [f32],
-    /// Columns of the unit lower factor of `L + anchor = F D F^T`, below the diagonal. Shape: `[V + 1]`.
-    #[rkyv(with = InlineAsBox)]
-    pub factor_offsets: &'a [u32],
-    /// Row (solver index) of each entry, ascending within a column, greater than the column.
-    #[rkyv(with = InlineAsBox)]
-    pub factor_rows: &'a [u32],
-    /// Entries of F. Shape: that of `factor_rows`.
-    #[rkyv(with = InlineAsBox)]
-    pub factor_values: &'a [f32],
-    /// `1 / D`, positive. Shape: `[V]`.
-    #[rkyv(with = InlineAsBox)]
-    pub inverse_pivots: &'a [f32],
     /// Network value to log-rotation, radians. Positive.
     pub rotation_scale: f32,
     /// Network value to stretch. Positive.
@@ -56,9 +32,49 @@ pub struct BakedBasis<'a> {
     /// Components in block order. Shape: `[K]`.
     #[rkyv(with = InlineAsBox)]
     pub components: &'a [BakedComponent<'a>],
-    /// Vertices (solver indices, ascending within a block) that any of a block's components moves. Shape: `[sum of support_count]`.
+    /// The tier whose nodes are the vertices: N = V.
+    pub exact: BakedTier<'a>,
+    /// A tier of fewer nodes.
+    pub fast: Option<BakedTier<'a>>,
+}
+
+/// What a frame reads from blend to solve, for a set of N nodes: all vertices, or a graph that stands for them. Solver
+/// indices number the nodes in the tier's own order of elimination.
+#[derive(Archive, Serialize, Debug, Clone, Copy)]
+pub struct BakedTier<'a> {
+    /// Rest shape of the nodes, solver order. Shape: `[N]`.
+    #[rkyv(with = InlineAsBox)]
+    pub rest_positions: &'a [[f32; 3]],
+    /// One-rings (with bridges) in solver order, compressed rows. Shape: `[N + 1]`, starts at 0, never falls.
+    #[rkyv(with = InlineAsBox)]
+    pub ring_offsets: &'a [u32],
+    /// Solver indices, ascending within a row, never the row itself. Shape: `[2 * edges]`.
+    #[rkyv(with = InlineAsBox)]
+    pub ring: &'a [u32],
+    /// Half the cotangent sum of each edge, non-negative, symmetric. Shape: that of `ring`.
+    #[rkyv(with = InlineAsBox)]
+    pub ring_weights: &'a [f32],
+    /// Columns of the unit lower factor of `L + anchor = F D F^T`, below the diagonal. Shape: `[N + 1]`.
+    #[rkyv(with = InlineAsBox)]
+    pub factor_offsets: &'a [u32],
+    /// Row (solver index) of each entry, ascending within a column, greater than the column.
+    #[rkyv(with = InlineAsBox)]
+    pub factor_rows: &'a [u32],
+    /// Entries of F. Shape: that of `factor_rows`.
+    #[rkyv(with = InlineAsBox)]
+    pub factor_values: &'a [f32],
+    /// `1 / D`, positive. Shape: `[N]`.
+    #[rkyv(with = InlineAsBox)]
+    pub inverse_pivots: &'a [f32],
+    /// Compressed rows over `support`, one a block. Shape: `[B + 1]`, starts at 0, never falls.
+    #[rkyv(with = InlineAsBox)]
+    pub support_offsets: &'a [u32],
+    /// Nodes (solver indices, ascending within a block) that any of a block's components moves.
     #[rkyv(with = InlineAsBox)]
     pub support: &'a [u32],
+    /// Compressed rows over `entry_slots`, one a component. Shape: `[K + 1]`, starts at 0, never falls.
+    #[rkyv(with = InlineAsBox)]
+    pub entry_offsets: &'a [u32],
     /// For each entry of a component the place in its block's support, ascending within a component.
     #[rkyv(with = InlineAsBox)]
     pub entry_slots: &'a [u32],
@@ -78,10 +94,6 @@ pub struct BakedBlock {
     pub first_component: u32,
     /// How many components follow.
     pub component_count: u32,
-    /// First of this block's vertices in `support`.
-    pub first_support: u32,
-    /// How many vertices follow.
-    pub support_count: u32,
     /// Bias of the decoder's convolution.
     pub bias: [f32; FEATURE_COUNT],
 }
@@ -98,10 +110,6 @@ pub struct BakedComponent<'a> {
     pub minimum: f32,
     /// Upper stop of the control; at least 0.
     pub maximum: f32,
-    /// First entry in `entry_slots` and `entry_values`.
-    pub first_entry: u32,
-    /// How many entries follow.
-    pub entry_count: u32,
-    /// Multiplies the half-precision values. Positive.
+    /// Multiplies the half-precision values of every tier. Positive.
     pub value_scale: f32,
 }

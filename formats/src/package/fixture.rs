@@ -9,8 +9,8 @@ use alloc::vec::Vec;
 use half::f16;
 
 use super::{
-    BakedBasis, BakedBlock, BakedComponent, BlockRecord, CompactBasis, ComponentRecord, FEATURE_COUNT, GraphConvRecord,
-    Header, NONE, PackageKind, Provenance, Quality, write_compact,
+    BakedBasis, BakedBlock, BakedComponent, BakedTier, BlockRecord, CompactBasis, ComponentRecord, FEATURE_COUNT,
+    GraphConvRecord, Header, NONE, PackageKind, Provenance, Quality, write_compact,
 };
 
 /// V of the grid.
@@ -45,10 +45,22 @@ pub struct TinyCompact {
 #[expect(missing_docs, reason = "fields are those of BakedBasis")]
 pub struct TinyBaked {
     pub compact_id: [u8; 16],
-    pub rest_positions: Vec<[f32; 3]>,
     pub faces: Vec<[u32; 3]>,
     pub solver_from_vertex: Vec<u32>,
     pub vertex_from_solver: Vec<u32>,
+    pub rotation_scale: f32,
+    pub stretch_scale: f32,
+    pub blocks: Vec<BakedBlock>,
+    pub components: Vec<BakedComponent<'static>>,
+    pub exact: TinyTier,
+    pub fast: Option<TinyTier>,
+}
+
+/// Owns what a [`BakedTier`] borrows.
+#[derive(Debug, Clone, Default)]
+#[expect(missing_docs, reason = "fields are those of BakedTier")]
+pub struct TinyTier {
+    pub rest_positions: Vec<[f32; 3]>,
     pub ring_offsets: Vec<u32>,
     pub ring: Vec<u32>,
     pub ring_weights: Vec<f32>,
@@ -56,11 +68,9 @@ pub struct TinyBaked {
     pub factor_rows: Vec<u32>,
     pub factor_values: Vec<f32>,
     pub inverse_pivots: Vec<f32>,
-    pub rotation_scale: f32,
-    pub stretch_scale: f32,
-    pub blocks: Vec<BakedBlock>,
-    pub components: Vec<BakedComponent<'static>>,
+    pub support_offsets: Vec<u32>,
     pub support: Vec<u32>,
+    pub entry_offsets: Vec<u32>,
     pub entry_slots: Vec<u32>,
     pub entry_values: Vec<[u16; FEATURE_COUNT]>,
 }
@@ -90,10 +100,23 @@ impl TinyBaked {
     pub fn basis(&self) -> BakedBasis<'_> {
         BakedBasis {
             compact_id: self.compact_id,
-            rest_positions: &self.rest_positions,
             faces: &self.faces,
             solver_from_vertex: &self.solver_from_vertex,
             vertex_from_solver: &self.vertex_from_solver,
+            rotation_scale: self.rotation_scale,
+            stretch_scale: self.stretch_scale,
+            blocks: &self.blocks,
+            components: &self.components,
+            exact: self.exact.tier(),
+            fast: self.fast.as_ref().map(TinyTier::tier),
+        }
+    }
+}
+
+impl TinyTier {
+    fn tier(&self) -> BakedTier<'_> {
+        BakedTier {
+            rest_positions: &self.rest_positions,
             ring_offsets: &self.ring_offsets,
             ring: &self.ring,
             ring_weights: &self.ring_weights,
@@ -101,11 +124,9 @@ impl TinyBaked {
             factor_rows: &self.factor_rows,
             factor_values: &self.factor_values,
             inverse_pivots: &self.inverse_pivots,
-            rotation_scale: self.rotation_scale,
-            stretch_scale: self.stretch_scale,
-            blocks: &self.blocks,
-            components: &self.components,
+            support_offsets: &self.support_offsets,
             support: &self.support,
+            entry_offsets: &self.entry_offsets,
             entry_slots: &self.entry_slots,
             entry_values: &self.entry_values,
         }
@@ -185,112 +206,107 @@ pub fn tiny_baked() -> TinyBaked {
     let solver_from_vertex: Vec<u32> = (0..VERTEX_COUNT as u32)
         .map(|vertex| VERTEX_FROM_SOLVER.iter().position(|&v| v == vertex).unwrap_or_default() as u32)
         .collect();
-    let mut baked = TinyBaked {
-        compact_id: compact_id(&compact),
+    let mut exact = TinyTier {
         rest_positions: VERTEX_FROM_SOLVER.map(|v| compact.rest_positions[v as usize]).to_vec(),
-        faces: compact.faces.clone(),
-        solver_from_vertex,
-        vertex_from_solver: VERTEX_FROM_SOLVER.to_vec(),
         ring_offsets: alloc::vec![0],
-        ring: Vec::new(),
-        ring_weights: Vec::new(),
-        factor_offsets: alloc::vec![0],
-        factor_rows: Vec::new(),
-        factor_values: Vec::new(),
-        inverse_pivots: Vec::new(),
-        rotation_scale: compact.rotation_scale,
-        stretch_scale: compact.stretch_scale,
-        blocks: Vec::new(),
-        components: Vec::new(),
-        support: Vec::new(),
-        entry_slots: Vec::new(),
-        entry_values: Vec::new(),
+        ..TinyTier::default()
     };
     for row in 0..VERTEX_COUNT {
         for column in 0..VERTEX_COUNT {
             if let Some(weight) = weights[VERTEX_FROM_SOLVER[row] as usize][VERTEX_FROM_SOLVER[column] as usize] {
-                baked.ring.push(column as u32);
-                baked.ring_weights.push(weight);
+                exact.ring.push(column as u32);
+                exact.ring_weights.push(weight);
             }
         }
-        baked.ring_offsets.push(baked.ring.len() as u32);
+        exact.ring_offsets.push(exact.ring.len() as u32);
     }
-    factorize(&mut baked);
-    fold(&compact, &mut baked);
-    baked
+    factorize(&mut exact, solver_from_vertex[ANCHOR_VERTEX as usize] as usize);
+    fold(&compact, &mut exact);
+    TinyBaked {
+        compact_id: compact_id(&compact),
+        faces: compact.faces.clone(),
+        solver_from_vertex,
+        vertex_from_solver: VERTEX_FROM_SOLVER.to_vec(),
+        rotation_scale: compact.rotation_scale,
+        stretch_scale: compact.stretch_scale,
+        blocks: compact.blocks.iter().map(baked_block).collect(),
+        components: compact.components.iter().map(baked_component).collect(),
+        exact,
+        fast: None,
+    }
 }
 
-/// The Laplacian, with 1 added at the anchor, to `F D F^T`, dense.
-fn factorize(baked: &mut TinyBaked) {
+fn baked_block(block: &BlockRecord) -> BakedBlock {
+    BakedBlock {
+        level: block.level,
+        parent_component: block.parent_component,
+        first_component: block.first_component,
+        component_count: block.component_count,
+        bias: block.decoder.bias,
+    }
+}
+
+fn baked_component(component: &ComponentRecord<'static>) -> BakedComponent<'static> {
+    BakedComponent {
+        name: component.name,
+        block: component.block,
+        minimum: component.minimum,
+        maximum: component.maximum,
+        value_scale: component.value_scale,
+    }
+}
+
+/// The Laplacian, with 1 added at the anchor (solver index), to `F D F^T`, dense.
+fn factorize(tier: &mut TinyTier, anchor: usize) {
     let mut lower = [[0.0_f64; VERTEX_COUNT]; VERTEX_COUNT];
     for row in 0..VERTEX_COUNT {
-        for entry in baked.ring_offsets[row] as usize..baked.ring_offsets[row + 1] as usize {
-            let weight = f64::from(baked.ring_weights[entry]);
+        for entry in tier.ring_offsets[row] as usize..tier.ring_offsets[row + 1] as usize {
+            let weight = f64::from(tier.ring_weights[entry]);
             lower[row][row] += weight;
-            lower[row][baked.ring[entry] as usize] -= weight;
+            lower[row][tier.ring[entry] as usize] -= weight;
         }
     }
-    let anchor = baked.solver_from_vertex[ANCHOR_VERTEX as usize] as usize;
     lower[anchor][anchor] += 1.0;
+    tier.factor_offsets.push(0);
     for column in 0..VERTEX_COUNT {
         let pivot = lower[column][column];
-        baked.inverse_pivots.push((1.0 / pivot) as f32);
+        tier.inverse_pivots.push((1.0 / pivot) as f32);
         for row in column + 1..VERTEX_COUNT {
             let value = lower[row][column] / pivot;
             for other in column + 1..VERTEX_COUNT {
                 lower[row][other] -= value * lower[column][other];
             }
             if value != 0.0 {
-                baked.factor_rows.push(row as u32);
-                baked.factor_values.push(value as f32);
+                tier.factor_rows.push(row as u32);
+                tier.factor_values.push(value as f32);
             }
         }
-        baked.factor_offsets.push(baked.factor_rows.len() as u32);
+        tier.factor_offsets.push(tier.factor_rows.len() as u32);
     }
 }
 
 /// Multiplies the components by the decoders: `point C_k + neighbour mean C_k`, on supports grown by a ring.
-fn fold(compact: &TinyCompact, baked: &mut TinyBaked) {
+fn fold(compact: &TinyCompact, tier: &mut TinyTier) {
     let dense = dense_components(compact);
-    for (b, block) in compact.blocks.iter().enumerate() {
+    tier.support_offsets.push(0);
+    tier.entry_offsets.push(0);
+    for block in &compact.blocks {
         let own = block.first_component as usize..(block.first_component + block.component_count) as usize;
-        let folded: Vec<Vec<[f32; FEATURE_COUNT]>> = own
-            .clone()
-            .map(|k| convolve(&block.decoder, &dense[k], baked))
-            .collect();
+        let folded: Vec<Vec<[f32; FEATURE_COUNT]>> = own.map(|k| convolve(&block.decoder, &dense[k], tier)).collect();
         let moves = |solver: usize| folded.iter().any(|component| component[solver] != [0.0; FEATURE_COUNT]);
         let support: Vec<usize> = (0..VERTEX_COUNT).filter(|&solver| moves(solver)).collect();
-        baked.blocks.push(BakedBlock {
-            level: block.level,
-            parent_component: block.parent_component,
-            first_component: block.first_component,
-            component_count: block.component_count,
-            first_support: baked.support.len() as u32,
-            support_count: support.len() as u32,
-            bias: block.decoder.bias,
-        });
-        for (k, component) in own.zip(&folded) {
-            let first_entry = baked.entry_slots.len() as u32;
+        for component in &folded {
             for (slot, &solver) in support.iter().enumerate() {
                 if component[solver] != [0.0; FEATURE_COUNT] {
-                    baked.entry_slots.push(slot as u32);
-                    baked
-                        .entry_values
+                    tier.entry_slots.push(slot as u32);
+                    tier.entry_values
                         .push(component[solver].map(|value| f16::from_f32(value).to_bits()));
                 }
             }
-            let record = compact.components[k];
-            baked.components.push(BakedComponent {
-                name: record.name,
-                block: b as u32,
-                minimum: record.minimum,
-                maximum: record.maximum,
-                first_entry,
-                entry_count: baked.entry_slots.len() as u32 - first_entry,
-                value_scale: record.value_scale,
-            });
+            tier.entry_offsets.push(tier.entry_slots.len() as u32);
         }
-        baked.support.extend(support.iter().map(|&solver| solver as u32));
+        tier.support.extend(support.iter().map(|&solver| solver as u32));
+        tier.support_offsets.push(tier.support.len() as u32);
     }
 }
 
@@ -312,14 +328,14 @@ fn dense_components(compact: &TinyCompact) -> Vec<[[f32; FEATURE_COUNT]; VERTEX_
 fn convolve(
     conv: &GraphConvRecord,
     component: &[[f32; FEATURE_COUNT]; VERTEX_COUNT],
-    baked: &TinyBaked,
+    tier: &TinyTier,
 ) -> Vec<[f32; FEATURE_COUNT]> {
     let in_solver_order = |solver: u32| component[VERTEX_FROM_SOLVER[solver as usize] as usize];
     let product = |matrix: &[[f32; FEATURE_COUNT]; FEATURE_COUNT], input: [f32; FEATURE_COUNT]| {
         matrix.map(|row| row.iter().zip(input).map(|(a, x)| a * x).sum::<f32>())
     };
     let convolved = (0..VERTEX_COUNT).map(|solver| {
-        let ring = &baked.ring[baked.ring_offsets[solver] as usize..baked.ring_offsets[solver + 1] as usize];
+        let ring = &tier.ring[tier.ring_offsets[solver] as usize..tier.ring_offsets[solver + 1] as usize];
         let mean: [f32; FEATURE_COUNT] = core::array::from_fn(|i| {
             ring.iter().map(|&other| in_solver_order(other)[i]).sum::<f32>() / ring.len() as f32
         });

@@ -6,9 +6,9 @@ use super::OpenError;
 /// First bytes of a package. A non-ASCII byte, both line ends and an end-of-file mark reveal a transfer in text mode.
 pub const MAGIC: [u8; 8] = [0x89, b'S', b'N', b'W', b'\r', b'\n', 0x1a, b'\n'];
 /// Version this crate writes, and the newest it reads.
-pub const FORMAT_VERSION: u16 = 1;
-/// Oldest version this crate reads.
-pub const FIRST_VERSION: u16 = 1;
+pub const FORMAT_VERSION: u16 = 2;
+/// Oldest version this crate reads. Version 1 was never released.
+pub const FIRST_VERSION: u16 = 2;
 /// Size of the header.
 pub const HEADER_BYTES: usize = 64;
 /// Required alignment of a package in memory; the payload keeps it because the header is a multiple of it.
@@ -18,7 +18,7 @@ pub const PAYLOAD_ALIGNMENT: usize = 16;
 const CRC: crc::Crc<u32, crc::Table<16>> = crc::Crc::<u32, crc::Table<16>>::new(&crc::CRC_32_ISCSI);
 /// The header's own checksum covers everything before it.
 const HEADER_CRC_AT: usize = 60;
-/// Bytes that version 1 leaves at zero, so that a later version can use them.
+/// Bytes that this version leaves at zero, so that a later one can use them.
 const RESERVED: [core::ops::Range<usize>; 3] = [13..24, 36..40, 56..60];
 
 /// What a package holds.
@@ -228,10 +228,13 @@ mod tests {
         assert_eq!(Header::read(&good[..63]), Err(OpenError::TooShort { actual: 63 }));
         assert_eq!(Header::read(b"v 1.0 2.0 3.0"), Err(OpenError::WrongMagic));
         assert_eq!(Header::read(&with(20, 1)), Err(OpenError::HeaderCorrupt));
-        assert_eq!(Header::read(&seal(with(8, 0))), Err(version(0)));
+        for old in 0..FIRST_VERSION {
+            assert_eq!(Header::read(&seal(with(8, old as u8))), Err(version(old)));
+        }
+        let next = FORMAT_VERSION + 1;
         let mut newer = good;
-        newer[8..12].copy_from_slice(&[2, 0, 2, 0]);
-        assert_eq!(Header::read(&seal(newer)), Err(version(2)));
+        newer[8..12].copy_from_slice(&[next as u8, 0, next as u8, 0]);
+        assert_eq!(Header::read(&seal(newer)), Err(version(next)));
         assert_eq!(
             Header::read(&seal(with(12, 7))),
             Err(OpenError::UnknownKind { found: 7 })
@@ -244,7 +247,11 @@ mod tests {
     #[test]
     fn a_newer_package_that_names_this_reader_is_read() {
         let mut header = Header::for_payload(PackageKind::Compact, b"").to_bytes();
-        header[8] = 2;
-        assert_eq!(Header::read(&seal(header)).map(|header| header.format_version), Ok(2));
+        let next = FORMAT_VERSION + 1;
+        header[8] = next as u8;
+        assert_eq!(
+            Header::read(&seal(header)).map(|header| header.format_version),
+            Ok(next)
+        );
     }
 }

@@ -2,6 +2,7 @@
 //! [`BakedBasis`] (the same, ready for the frame path).
 
 mod baked;
+mod baked_view;
 mod basis;
 mod error;
 #[cfg(feature = "std")]
@@ -18,8 +19,10 @@ mod tests;
 mod write;
 
 pub use baked::{
-    ArchivedBakedBasis, ArchivedBakedBlock, ArchivedBakedComponent, BakedBasis, BakedBlock, BakedComponent,
+    ArchivedBakedBasis, ArchivedBakedBlock, ArchivedBakedComponent, ArchivedBakedTier, BakedBasis, BakedBlock,
+    BakedComponent, BakedTier,
 };
+pub use baked_view::{BakedView, TierView};
 pub use basis::{
     ArchivedBlockRecord, ArchivedCompactBasis, ArchivedComponentRecord, ArchivedGraphConvRecord, ArchivedProvenance,
     ArchivedQuality, BlockRecord, CompactBasis, ComponentRecord, GraphConvRecord, Provenance, Quality,
@@ -28,7 +31,7 @@ pub use error::OpenError;
 #[cfg(feature = "std")]
 pub use file::{ReadError, SaveError, read_package, save_package};
 pub use header::{FIRST_VERSION, FORMAT_VERSION, HEADER_BYTES, Header, MAGIC, PAYLOAD_ALIGNMENT, PackageKind};
-pub use open::{BakedView, CompactEntry, CompactView};
+pub use open::{CompactEntry, CompactView};
 #[cfg(feature = "alloc")]
 pub use write::{AlignedBytes, WriteError, write_baked, write_compact};
 

@@ -4,9 +4,8 @@
 use rkyv::{api::low::access, boxed::ArchivedBox, rancor::Failure};
 
 use super::{
-    ArchivedBakedBasis, ArchivedBlockRecord, ArchivedCompactBasis, ArchivedGraphConvRecord, BakedBlock, BakedComponent,
-    BlockRecord, ComponentRecord, FEATURE_COUNT, GraphConvRecord, Header, OpenError, PackageKind, Provenance, Quality,
-    rules,
+    ArchivedBlockRecord, ArchivedCompactBasis, ArchivedGraphConvRecord, BlockRecord, ComponentRecord, FEATURE_COUNT,
+    GraphConvRecord, Header, OpenError, PackageKind, Provenance, Quality, rules,
 };
 
 #[cfg(target_endian = "big")]
@@ -20,15 +19,8 @@ pub struct CompactView<'a> {
     archived: &'a ArchivedCompactBasis<'static>,
 }
 
-/// An opened baked package; borrows its bytes. Fields mean what [`super::BakedBasis`] says.
-#[derive(Clone, Copy)]
-pub struct BakedView<'a> {
-    header: Header,
-    archived: &'a ArchivedBakedBasis<'static>,
-}
-
 /// The payload of a package that should be of `kind`, proved whole.
-fn payload(bytes: &[u8], kind: PackageKind) -> Result<(Header, &[u8]), OpenError> {
+pub(super) fn payload(bytes: &[u8], kind: PackageKind) -> Result<(Header, &[u8]), OpenError> {
     let header = Header::read(bytes)?;
     let payload = header.payload(bytes)?;
     if header.kind != kind {
@@ -41,7 +33,7 @@ fn payload(bytes: &[u8], kind: PackageKind) -> Result<(Header, &[u8]), OpenError
 }
 
 /// Reads archived numbers as native ones. Both are plain data of one size and alignment, so the cast cannot fail.
-fn native<A: bytemuck::NoUninit, N: bytemuck::AnyBitPattern>(archived: &ArchivedBox<[A]>) -> &[N] {
+pub(super) fn native<A: bytemuck::NoUninit, N: bytemuck::AnyBitPattern>(archived: &ArchivedBox<[A]>) -> &[N] {
     bytemuck::cast_slice(archived.get())
 }
 
@@ -227,168 +219,5 @@ fn graph_conv(conv: &ArchivedGraphConvRecord) -> GraphConvRecord {
         point: bytemuck::cast(conv.point),
         neighbour: bytemuck::cast(conv.neighbour),
         bias: bytemuck::cast(conv.bias),
-    }
-}
-
-impl<'a> BakedView<'a> {
-    /// Checks everything and borrows. `bytes` is a whole package, at a multiple of 16 bytes in memory.
-    ///
-    /// Errors: any [`OpenError`]; the first fault found is the one reported.
-    pub fn open(bytes: &'a [u8]) -> Result<Self, OpenError> {
-        let (header, payload) = payload(bytes, PackageKind::Baked)?;
-        let archived = access::<ArchivedBakedBasis<'static>, Failure>(payload).map_err(|_| OpenError::Malformed)?;
-        let view = Self { header, archived };
-        rules::baked::check(&view)?;
-        Ok(view)
-    }
-
-    /// The header in front of the payload.
-    pub fn header(&self) -> Header {
-        self.header
-    }
-
-    /// Names the content; equal exactly when the payloads are.
-    pub fn content_id(&self) -> [u8; 16] {
-        self.header.content_id
-    }
-
-    /// Content id of the compact package this was baked from.
-    pub fn compact_id(&self) -> [u8; 16] {
-        self.archived.compact_id
-    }
-
-    /// V, at least 3.
-    pub fn vertex_count(&self) -> usize {
-        self.archived.rest_positions.len()
-    }
-
-    /// B, at least 1.
-    pub fn block_count(&self) -> usize {
-        self.archived.blocks.len()
-    }
-
-    /// K, at least 1.
-    pub fn component_count(&self) -> usize {
-        self.archived.components.len()
-    }
-
-    /// Solver order, finite. Shape: `[V]`.
-    pub fn rest_positions(&self) -> &'a [[f32; 3]] {
-        native(&self.archived.rest_positions)
-    }
-
-    /// Source order. Shape: `[F]`, each index < V.
-    pub fn faces(&self) -> &'a [[u32; 3]] {
-        native(&self.archived.faces)
-    }
-
-    /// Shape: `[V]`, a permutation.
-    pub fn solver_from_vertex(&self) -> &'a [u32] {
-        native(&self.archived.solver_from_vertex)
-    }
-
-    /// Shape: `[V]`, its inverse.
-    pub fn vertex_from_solver(&self) -> &'a [u32] {
-        native(&self.archived.vertex_from_solver)
-    }
-
-    /// Shape: `[V + 1]`, from 0 to `ring().len()`, never falls.
-    pub fn ring_offsets(&self) -> &'a [u32] {
-        native(&self.archived.ring_offsets)
-    }
-
-    /// Solver indices < V, ascending within a row, never the row itself.
-    pub fn ring(&self) -> &'a [u32] {
-        native(&self.archived.ring)
-    }
-
-    /// Shape: that of `ring`; finite, non-negative, symmetric.
-    pub fn ring_weights(&self) -> &'a [f32] {
-        native(&self.archived.ring_weights)
-    }
-
-    /// Shape: `[V + 1]`, from 0 to `factor_rows().len()`, never falls.
-    pub fn factor_offsets(&self) -> &'a [u32] {
-        native(&self.archived.factor_offsets)
-    }
-
-    /// Solver indices < V, ascending within a column, greater than the column.
-    pub fn factor_rows(&self) -> &'a [u32] {
-        native(&self.archived.factor_rows)
-    }
-
-    /// Shape: that of `factor_rows`; finite.
-    pub fn factor_values(&self) -> &'a [f32] {
-        native(&self.archived.factor_values)
-    }
-
-    /// Shape: `[V]`; finite, positive.
-    pub fn inverse_pivots(&self) -> &'a [f32] {
-        native(&self.archived.inverse_pivots)
-    }
-
-    /// Network value to log-rotation, radians, positive.
-    pub fn rotation_scale(&self) -> f32 {
-        self.archived.rotation_scale.to_native()
-    }
-
-    /// Network value to stretch, positive.
-    pub fn stretch_scale(&self) -> f32 {
-        self.archived.stretch_scale.to_native()
-    }
-
-    /// Block `b` < B. Panics past the end, like a slice.
-    pub fn block(&self, b: usize) -> BakedBlock {
-        let block = &self.archived.blocks[b];
-        BakedBlock {
-            level: block.level.to_native(),
-            parent_component: block.parent_component.to_native(),
-            first_component: block.first_component.to_native(),
-            component_count: block.component_count.to_native(),
-            first_support: block.first_support.to_native(),
-            support_count: block.support_count.to_native(),
-            bias: bytemuck::cast(block.bias),
-        }
-    }
-
-    /// All blocks, parents before children.
-    pub fn blocks(&self) -> impl ExactSizeIterator<Item = BakedBlock> + use<'a> {
-        let view = *self;
-        (0..view.block_count()).map(move |b| view.block(b))
-    }
-
-    /// Component `k` < K. Panics past the end, like a slice.
-    pub fn component(&self, k: usize) -> BakedComponent<'a> {
-        let component = &self.archived.components[k];
-        BakedComponent {
-            name: component.name.get(),
-            block: component.block.to_native(),
-            minimum: component.minimum.to_native(),
-            maximum: component.maximum.to_native(),
-            first_entry: component.first_entry.to_native(),
-            entry_count: component.entry_count.to_native(),
-            value_scale: component.value_scale.to_native(),
-        }
-    }
-
-    /// All components, in block order.
-    pub fn components(&self) -> impl ExactSizeIterator<Item = BakedComponent<'a>> + use<'a> {
-        let view = *self;
-        (0..view.component_count()).map(move |k| view.component(k))
-    }
-
-    /// Solver indices < V, ascending within a block.
-    pub fn support(&self) -> &'a [u32] {
-        native(&self.archived.support)
-    }
-
-    /// Places in the block's support, ascending within a component.
-    pub fn entry_slots(&self) -> &'a [u32] {
-        native(&self.archived.entry_slots)
-    }
-
-    /// Half bits, finite. Shape: that of `entry_slots`.
-    pub fn entry_values(&self) -> &'a [[u16; FEATURE_COUNT]] {
-        native(&self.archived.entry_values)
     }
 }

@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use super::fixture::{tiny_baked, tiny_compact};
+use super::fixture::{TinyTier, tiny_baked, tiny_compact};
 use super::*;
 
 #[test]
@@ -33,10 +33,20 @@ fn a_baked_package_is_read_as_written() {
     let bytes = write_baked(&tiny.basis()).unwrap();
     let view = BakedView::open(&bytes).unwrap();
     assert_eq!(view.compact_id(), tiny.compact_id);
-    assert_eq!(view.rest_positions(), tiny.rest_positions);
     assert_eq!(view.faces(), tiny.faces);
     assert_eq!(view.solver_from_vertex(), tiny.solver_from_vertex);
     assert_eq!(view.vertex_from_solver(), tiny.vertex_from_solver);
+    assert_eq!(view.rotation_scale(), tiny.rotation_scale);
+    assert_eq!(view.stretch_scale(), tiny.stretch_scale);
+    assert_eq!(view.blocks().collect::<Vec<_>>(), tiny.blocks);
+    assert_eq!(view.components().collect::<Vec<_>>(), tiny.components);
+    tier_is_read_as_written(&view.exact(), &tiny.exact);
+    assert!(view.fast().is_none());
+}
+
+fn tier_is_read_as_written(view: &TierView<'_>, tiny: &TinyTier) {
+    assert_eq!(view.node_count(), tiny.rest_positions.len());
+    assert_eq!(view.rest_positions(), tiny.rest_positions);
     assert_eq!(view.ring_offsets(), tiny.ring_offsets);
     assert_eq!(view.ring(), tiny.ring);
     assert_eq!(view.ring_weights(), tiny.ring_weights);
@@ -44,13 +54,24 @@ fn a_baked_package_is_read_as_written() {
     assert_eq!(view.factor_rows(), tiny.factor_rows);
     assert_eq!(view.factor_values(), tiny.factor_values);
     assert_eq!(view.inverse_pivots(), tiny.inverse_pivots);
-    assert_eq!(view.rotation_scale(), tiny.rotation_scale);
-    assert_eq!(view.stretch_scale(), tiny.stretch_scale);
-    assert_eq!(view.blocks().collect::<Vec<_>>(), tiny.blocks);
-    assert_eq!(view.components().collect::<Vec<_>>(), tiny.components);
+    assert_eq!(view.support_offsets(), tiny.support_offsets);
     assert_eq!(view.support(), tiny.support);
+    assert_eq!(view.entry_offsets(), tiny.entry_offsets);
     assert_eq!(view.entry_slots(), tiny.entry_slots);
     assert_eq!(view.entry_values(), tiny.entry_values);
+}
+
+#[test]
+fn a_second_tier_is_read_as_written() {
+    let mut tiny = tiny_baked();
+    let mut fast = tiny.exact.clone();
+    fast.rest_positions[0][0] = -0.5;
+    fast.inverse_pivots[3] = 0.25;
+    tiny.fast = Some(fast.clone());
+    let bytes = write_baked(&tiny.basis()).unwrap();
+    let view = BakedView::open(&bytes).unwrap();
+    tier_is_read_as_written(&view.exact(), &tiny.exact);
+    tier_is_read_as_written(&view.fast().unwrap(), &fast);
 }
 
 #[test]
@@ -106,6 +127,7 @@ fn records_lie_as_documented() {
     type Compact = ArchivedCompactBasis<'static>;
     type Component = ArchivedComponentRecord<'static>;
     type Baked = ArchivedBakedBasis<'static>;
+    type Tier = ArchivedBakedTier<'static>;
     type Control = ArchivedBakedComponent<'static>;
     let compact = places!(Compact {
         rest_positions,
@@ -165,10 +187,20 @@ fn records_lie_as_documented() {
     assert_eq!(size_of::<ArchivedQuality>(), 12);
     let baked = places!(Baked {
         compact_id,
-        rest_positions,
         faces,
         solver_from_vertex,
         vertex_from_solver,
+        rotation_scale,
+        stretch_scale,
+        blocks,
+        components,
+        exact,
+        fast,
+    });
+    assert_eq!(baked, [0, 16, 24, 32, 40, 44, 48, 56, 64, 168]);
+    assert_eq!((size_of::<Baked>(), align_of::<Baked>()), (276, 4));
+    let tier = places!(Tier {
+        rest_positions,
         ring_offsets,
         ring,
         ring_weights,
@@ -176,41 +208,30 @@ fn records_lie_as_documented() {
         factor_rows,
         factor_values,
         inverse_pivots,
-        rotation_scale,
-        stretch_scale,
-        blocks,
-        components,
+        support_offsets,
         support,
+        entry_offsets,
         entry_slots,
         entry_values,
     });
-    assert_eq!(
-        baked,
-        [
-            0, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 108, 112, 120, 128, 136, 144
-        ]
-    );
-    assert_eq!((size_of::<Baked>(), align_of::<Baked>()), (152, 4));
+    assert_eq!(tier, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96]);
+    assert_eq!((size_of::<Tier>(), align_of::<Tier>()), (104, 4));
     let block = places!(ArchivedBakedBlock {
         level,
         parent_component,
         first_component,
         component_count,
-        first_support,
-        support_count,
         bias,
     });
-    assert_eq!(block, [0, 4, 8, 12, 16, 20, 24]);
-    assert_eq!(size_of::<ArchivedBakedBlock>(), 60);
+    assert_eq!(block, [0, 4, 8, 12, 16]);
+    assert_eq!(size_of::<ArchivedBakedBlock>(), 52);
     let control = places!(Control {
         name,
         block,
         minimum,
         maximum,
-        first_entry,
-        entry_count,
         value_scale
     });
-    assert_eq!(control, [0, 8, 12, 16, 20, 24, 28]);
-    assert_eq!(size_of::<Control>(), 32);
+    assert_eq!(control, [0, 8, 12, 16, 20]);
+    assert_eq!(size_of::<Control>(), 24);
 }

@@ -11,7 +11,7 @@ pub mod sparse;
 mod surface;
 
 use sinew_formats::package::{
-    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, CompactView, OpenError, WriteError, write_baked,
+    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedTier, CompactView, OpenError, WriteError, write_baked,
 };
 
 use factor::{AnchoredLaplacian, EliminationOrder, Factor};
@@ -68,51 +68,50 @@ pub fn bake(package: &CompactView<'_>) -> Result<AlignedBytes, BakeError> {
     let gathered = FoldedBlocks::gather(&folded, &component_counts);
     let blocks: Vec<BakedBlock> = package
         .blocks()
-        .zip(gathered.support_offsets.windows(2))
-        .map(|(block, support)| BakedBlock {
+        .map(|block| BakedBlock {
             level: block.level,
             parent_component: block.parent_component,
             first_component: block.first_component,
             component_count: block.component_count,
-            first_support: support[0],
-            support_count: support[1] - support[0],
             bias: block.decoder.bias,
         })
         .collect();
     let components: Vec<BakedComponent<'_>> = package
         .components()
         .zip(&folded)
-        .zip(gathered.entry_offsets.windows(2))
-        .map(|((component, folded), entries)| BakedComponent {
+        .map(|(component, folded)| BakedComponent {
             name: component.name,
             block: component.block,
             minimum: component.minimum,
             maximum: component.maximum,
-            first_entry: entries[0],
-            entry_count: entries[1] - entries[0],
             value_scale: folded.value_scale,
         })
         .collect();
     write_baked(&BakedBasis {
         compact_id: package.content_id(),
-        rest_positions: &rest_positions,
         faces: package.faces(),
         solver_from_vertex: &order.solver_from_vertex,
         vertex_from_solver: &order.vertex_from_solver,
-        ring_offsets: &rings.offsets,
-        ring: &rings.ring,
-        ring_weights: &rings.weights,
-        factor_offsets: &factor.offsets,
-        factor_rows: &factor.rows,
-        factor_values: &factor.values,
-        inverse_pivots: &factor.inverse_pivots,
         rotation_scale: package.rotation_scale(),
         stretch_scale: package.stretch_scale(),
         blocks: &blocks,
         components: &components,
-        support: &gathered.support,
-        entry_slots: &gathered.entry_slots,
-        entry_values: &gathered.entry_values,
+        exact: BakedTier {
+            rest_positions: &rest_positions,
+            ring_offsets: &rings.offsets,
+            ring: &rings.ring,
+            ring_weights: &rings.weights,
+            factor_offsets: &factor.offsets,
+            factor_rows: &factor.rows,
+            factor_values: &factor.values,
+            inverse_pivots: &factor.inverse_pivots,
+            support_offsets: &gathered.support_offsets,
+            support: &gathered.support,
+            entry_offsets: &gathered.entry_offsets,
+            entry_slots: &gathered.entry_slots,
+            entry_values: &gathered.entry_values,
+        },
+        fast: None,
     })
     .map_err(BakeError::Refused)
 }

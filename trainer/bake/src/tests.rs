@@ -14,12 +14,12 @@ fn factor_reproduces_the_laplacian() {
     let compact = CompactView::open(&compact).unwrap();
     let baked = bake(&compact).unwrap();
     let baked = BakedView::open(&baked).unwrap();
-    let vertex_count = baked.vertex_count();
+    let (exact, vertex_count) = (baked.exact(), baked.vertex_count());
     let mut lower = vec![vec![0.0_f64; vertex_count]; vertex_count];
     for column in 0..vertex_count {
         lower[column][column] = 1.0;
-        for e in baked.factor_offsets()[column] as usize..baked.factor_offsets()[column + 1] as usize {
-            lower[baked.factor_rows()[e] as usize][column] = f64::from(baked.factor_values()[e]);
+        for e in exact.factor_offsets()[column] as usize..exact.factor_offsets()[column + 1] as usize {
+            lower[exact.factor_rows()[e] as usize][column] = f64::from(exact.factor_values()[e]);
         }
     }
     let surface = Surface::of_package(&compact);
@@ -35,7 +35,7 @@ fn factor_reproduces_the_laplacian() {
                 None => 0.0,
             };
             let product: f64 = (0..vertex_count)
-                .map(|c| lower[i][c] * lower[j][c] / f64::from(baked.inverse_pivots()[c]))
+                .map(|c| lower[i][c] * lower[j][c] / f64::from(exact.inverse_pivots()[c]))
                 .sum();
             assert!(
                 (product - expected).abs() < FACTOR_TOLERANCE * largest,
@@ -53,18 +53,14 @@ fn identity_convolution_changes_no_value() {
     let baked = BakedView::open(&baked).unwrap();
     let components = sparse::unpack_components(&compact);
     for (k, (component, stored)) in baked.components().zip(&components).enumerate() {
-        let block = baked.block(component.block as usize);
-        assert_eq!(
-            component.entry_count as usize,
-            stored.vertices.len(),
-            "component {k} keeps its support"
-        );
-        for e in component.first_entry as usize..(component.first_entry + component.entry_count) as usize {
-            let solver = baked.support()[(block.first_support + baked.entry_slots()[e]) as usize];
-            let vertex = baked.vertex_from_solver()[solver as usize];
+        let support = baked.exact().support_of(component.block as usize);
+        let (slots, values) = baked.exact().entries_of(k);
+        assert_eq!(slots.len(), stored.vertices.len(), "component {k} keeps its support");
+        for (&slot, bits) in slots.iter().zip(values) {
+            let vertex = baked.vertex_from_solver()[support[slot as usize] as usize];
             let place = stored.vertices.binary_search(&vertex).unwrap();
             let value: [f32; FEATURE_COUNT] =
-                baked.entry_values()[e].map(|bits| half::f16::from_bits(bits).to_f32() * component.value_scale);
+                bits.map(|bits| half::f16::from_bits(bits).to_f32() * component.value_scale);
             assert_eq!(value, stored.values[place], "component {k}, vertex {vertex}");
         }
     }

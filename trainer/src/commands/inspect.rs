@@ -200,15 +200,19 @@ fn print_block(
 }
 
 fn print_baked(out: &mut String, view: &BakedView<'_>, byte_count: usize, as_json: bool) {
+    let exact = view.exact();
     let components: Vec<_> = view
         .components()
-        .map(|c| json!({ "name": c.name, "range": [c.minimum, c.maximum], "vertices": c.entry_count }))
+        .enumerate()
+        .map(|(k, c)| {
+            json!({ "name": c.name, "range": [c.minimum, c.maximum], "vertices": exact.entries_of(k).0.len() })
+        })
         .collect();
     if as_json {
         let summary = json!({
             "kind": "baked", "content_id": hex(view.content_id()), "compact_id": hex(view.compact_id()), "bytes": byte_count,
             "vertices": view.vertex_count(), "faces": view.faces().len(), "blocks": view.block_count(),
-            "factor_entries": view.factor_rows().len(), "components": components,
+            "factor_entries": exact.factor_rows().len(), "components": components,
         });
         let _ = writeln!(out, "{summary:#}");
         return;
@@ -223,9 +227,9 @@ fn print_baked(out: &mut String, view: &BakedView<'_>, byte_count: usize, as_jso
         out,
         "  {:.2} MB: factor {:.2} ({} entries), components {:.2}",
         byte_count as f64 / 1e6,
-        (view.factor_rows().len() * 8) as f64 / 1e6,
-        view.factor_rows().len(),
-        (view.entry_values().len() * 22) as f64 / 1e6
+        (exact.factor_rows().len() * 8) as f64 / 1e6,
+        exact.factor_rows().len(),
+        (exact.entry_values().len() * 22) as f64 / 1e6
     );
     let _ = writeln!(
         out,
@@ -237,11 +241,14 @@ fn print_baked(out: &mut String, view: &BakedView<'_>, byte_count: usize, as_jso
     );
     let _ = writeln!(out);
     let _ = writeln!(out, "{:<18} {:>18} {:>9}", "component", "range", "vertices");
-    for c in view.components() {
+    for (k, c) in view.components().enumerate() {
         let _ = writeln!(
             out,
             "{:<18} {:>8.2} .. {:>6.2} {:>9}",
-            c.name, c.minimum, c.maximum, c.entry_count
+            c.name,
+            c.minimum,
+            c.maximum,
+            exact.entries_of(k).0.len()
         );
     }
 }

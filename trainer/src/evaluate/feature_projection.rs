@@ -35,15 +35,13 @@ struct Entry {
 impl FeatureDecoder {
     /// Gathers a baked package by vertex.
     pub fn new(package: &BakedView<'_>) -> Self {
-        let vertex_count = package.vertex_count();
+        let (exact, vertex_count) = (package.exact(), package.vertex_count());
         let mut rows: Vec<Vec<Entry>> = vec![Vec::new(); vertex_count];
         for (k, component) in package.components().enumerate() {
-            let block = package.block(component.block as usize);
-            let range = component.first_entry as usize..(component.first_entry + component.entry_count) as usize;
-            let slots = &package.entry_slots()[range.clone()];
-            for (&slot, bits) in slots.iter().zip(&package.entry_values()[range]) {
-                let solver = package.support()[(block.first_support + slot) as usize];
-                let vertex = package.vertex_from_solver()[solver as usize] as usize;
+            let support = exact.support_of(component.block as usize);
+            let (slots, values) = exact.entries_of(k);
+            for (&slot, bits) in slots.iter().zip(values) {
+                let vertex = package.vertex_from_solver()[support[slot as usize] as usize] as usize;
                 let value = bits.map(|b| f16::from_bits(b).to_f32() * component.value_scale);
                 rows[vertex].push(Entry {
                     component: k as u32,

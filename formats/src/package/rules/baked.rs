@@ -1,17 +1,17 @@
-//! Rules of the baked payload: what the frame path relies on without looking.
+//! Rules of the baked payload: what the frame path relies on without looking. Both tiers obey the same rules, and their
+//! errors bear the same names.
 
 use super::{
-    super::{BakedView, OpenError, limits},
-    BlockLinks, ascending_below, below, control, count, finite_halves, mesh, names, offsets, positive, same_count,
-    tree, within,
+    super::{BakedView, OpenError, TierView, limits},
+    BlockLinks, ascending_below, below, control, count, faces, finite_halves, names, offsets, positions, positive,
+    same_count, tree, within,
 };
 
 /// Proves every promise that [`super::super::BakedBasis`] makes.
 pub(in super::super) fn check(view: &BakedView<'_>) -> Result<(), OpenError> {
-    let vertex_count = mesh(view.rest_positions(), view.faces())?;
+    let vertex_count = positions(view.exact().rest_positions(), 3)?;
+    faces(view.faces(), vertex_count)?;
     permutation(view, vertex_count)?;
-    rings(view, vertex_count)?;
-    factor(view, vertex_count)?;
     positive("rotation_scale", 0, view.rotation_scale(), limits::FEATURE_SCALE)?;
     positive("stretch_scale", 0, view.stretch_scale(), limits::FEATURE_SCALE)?;
     let links = |b| {
@@ -27,8 +27,22 @@ pub(in super::super) fn check(view: &BakedView<'_>) -> Result<(), OpenError> {
         view.component(k).block
     })?;
     names(view.component_count(), |k| view.component(k).name)?;
-    block_supports(view, vertex_count)?;
-    components(view)
+    for (b, block) in view.blocks().enumerate() {
+        for value in block.bias {
+            within("blocks.bias", b, value, -limits::NETWORK_VALUE, limits::NETWORK_VALUE)?;
+        }
+    }
+    for (k, component) in view.components().enumerate() {
+        control(k, component.minimum, component.maximum)?;
+        positive("components.value_scale", k, component.value_scale, limits::VALUE_SCALE)?;
+    }
+    tier(view, &view.exact())?;
+    if let Some(fast) = view.fast() {
+        let node_count = positions(fast.rest_positions(), 1)?;
+        count("rest_positions", node_count, 1, vertex_count)?;
+        tier(view, &fast)?;
+    }
+    Ok(())
 }
 
 /// Both lists have V indices < V and the second undoes the first, so both are permutations.
@@ -48,16 +62,25 @@ fn permutation(view: &BakedView<'_>, vertex_count: usize) -> Result<(), OpenErro
     Ok(())
 }
 
-fn rings(view: &BakedView<'_>, vertex_count: usize) -> Result<(), OpenError> {
-    let (ring, weights) = (view.ring(), view.ring_weights());
+/// A tier whose positions are proved.
+fn tier(view: &BakedView<'_>, tier: &TierView<'_>) -> Result<(), OpenError> {
+    rings(tier)?;
+    factor(tier)?;
+    supports(view, tier)?;
+    entries(view, tier)
+}
+
+fn rings(tier: &TierView<'_>) -> Result<(), OpenError> {
+    let node_count = tier.node_count();
+    let (ring, weights) = (tier.ring(), tier.ring_weights());
     count("ring", ring.len(), 0, limits::RING_ENTRIES)?;
     same_count("ring_weights", weights.len(), ring.len())?;
-    offsets("ring_offsets", view.ring_offsets(), vertex_count, ring.len())?;
-    let row = |v: usize| view.ring_offsets()[v] as usize..view.ring_offsets()[v + 1] as usize;
-    for v in 0..vertex_count {
-        ascending_below("ring", row(v).start, &ring[row(v)], vertex_count)?;
+    offsets("ring_offsets", tier.ring_offsets(), node_count, ring.len())?;
+    let row = |v: usize| tier.ring_offsets()[v] as usize..tier.ring_offsets()[v + 1] as usize;
+    for v in 0..node_count {
+        ascending_below("ring", row(v).start, &ring[row(v)], node_count)?;
     }
-    for v in 0..vertex_count {
+    for v in 0..node_count {
         for entry in row(v) {
             within("ring_weights", entry, weights[entry], 0.0, limits::EDGE_WEIGHT)?;
             let other = row(ring[entry] as usize);
@@ -77,15 +100,16 @@ fn rings(view: &BakedView<'_>, vertex_count: usize) -> Result<(), OpenError> {
     Ok(())
 }
 
-fn factor(view: &BakedView<'_>, vertex_count: usize) -> Result<(), OpenError> {
-    let (rows, values) = (view.factor_rows(), view.factor_values());
+fn factor(tier: &TierView<'_>) -> Result<(), OpenError> {
+    let node_count = tier.node_count();
+    let (rows, values) = (tier.factor_rows(), tier.factor_values());
     count("factor_rows", rows.len(), 0, limits::FACTOR_ENTRIES)?;
     same_count("factor_values", values.len(), rows.len())?;
-    offsets("factor_offsets", view.factor_offsets(), vertex_count, rows.len())?;
-    for (column, range) in view.factor_offsets().windows(2).enumerate() {
+    offsets("factor_offsets", tier.factor_offsets(), node_count, rows.len())?;
+    for (column, range) in tier.factor_offsets().windows(2).enumerate() {
         let start = range[0] as usize;
         let entries = &rows[start..range[1] as usize];
-        ascending_below("factor_rows", start, entries, vertex_count)?;
+        ascending_below("factor_rows", start, entries, node_count)?;
         if entries.first().is_some_and(|&row| row as usize <= column) {
             return Err(OpenError::NotAscending {
                 field: "factor_rows",
@@ -102,8 +126,8 @@ fn factor(view: &BakedView<'_>, vertex_count: usize) -> Result<(), OpenError> {
             limits::FACTOR_VALUE,
         )?;
     }
-    same_count("inverse_pivots", view.inverse_pivots().len(), vertex_count)?;
-    for (column, &pivot) in view.inverse_pivots().iter().enumerate() {
+    same_count("inverse_pivots", tier.inverse_pivots().len(), node_count)?;
+    for (column, &pivot) in tier.inverse_pivots().iter().enumerate() {
         positive("inverse_pivots", column, pivot, limits::INVERSE_PIVOT).map_err(|error| match error {
             OpenError::NotPositive { index, .. } => OpenError::PivotNotPositive { index },
             other => other,
@@ -112,58 +136,36 @@ fn factor(view: &BakedView<'_>, vertex_count: usize) -> Result<(), OpenError> {
     Ok(())
 }
 
-fn block_supports(view: &BakedView<'_>, vertex_count: usize) -> Result<(), OpenError> {
-    let support = view.support();
+fn supports(view: &BakedView<'_>, tier: &TierView<'_>) -> Result<(), OpenError> {
+    let support = tier.support();
     count("support", support.len(), 0, limits::ENTRIES)?;
-    let mut next = 0;
-    for (b, block) in view.blocks().enumerate() {
-        for value in block.bias {
-            within("blocks.bias", b, value, -limits::NETWORK_VALUE, limits::NETWORK_VALUE)?;
-        }
-        if block.first_support as usize != next {
-            return Err(OpenError::NotContiguous {
-                field: "blocks.first_support",
-                index: b,
-            });
-        }
-        let Some(own) = support[next..].get(..block.support_count as usize) else {
-            return Err(too_short("support", next, block.support_count, support.len()));
-        };
-        ascending_below("support", next, own, vertex_count)?;
-        next += own.len();
+    offsets(
+        "support_offsets",
+        tier.support_offsets(),
+        view.block_count(),
+        support.len(),
+    )?;
+    for b in 0..view.block_count() {
+        let start = tier.support_offsets()[b] as usize;
+        ascending_below("support", start, tier.support_of(b), tier.node_count())?;
     }
-    same_count("support", support.len(), next)
+    Ok(())
 }
 
-fn components(view: &BakedView<'_>) -> Result<(), OpenError> {
-    let (slots, values) = (view.entry_slots(), view.entry_values());
+fn entries(view: &BakedView<'_>, tier: &TierView<'_>) -> Result<(), OpenError> {
+    let (slots, values) = (tier.entry_slots(), tier.entry_values());
     count("entry_slots", slots.len(), 0, limits::ENTRIES)?;
     same_count("entry_values", values.len(), slots.len())?;
-    let mut next = 0;
+    offsets(
+        "entry_offsets",
+        tier.entry_offsets(),
+        view.component_count(),
+        slots.len(),
+    )?;
     for (k, component) in view.components().enumerate() {
-        control(k, component.minimum, component.maximum)?;
-        positive("components.value_scale", k, component.value_scale, limits::VALUE_SCALE)?;
-        if component.first_entry as usize != next {
-            return Err(OpenError::NotContiguous {
-                field: "components.first_entry",
-                index: k,
-            });
-        }
-        let Some(own) = slots[next..].get(..component.entry_count as usize) else {
-            return Err(too_short("entry_slots", next, component.entry_count, slots.len()));
-        };
-        let support_count = view.block(component.block as usize).support_count as usize;
-        ascending_below("entry_slots", next, own, support_count)?;
-        next += own.len();
+        let support_count = tier.support_of(component.block as usize).len();
+        let start = tier.entry_offsets()[k] as usize;
+        ascending_below("entry_slots", start, tier.entries_of(k).0, support_count)?;
     }
-    same_count("entry_slots", slots.len(), next)?;
     finite_halves("entry_values", values)
-}
-
-fn too_short(field: &'static str, start: usize, more: u32, actual: usize) -> OpenError {
-    OpenError::CountMismatch {
-        field,
-        expected: start as u64 + u64::from(more),
-        actual: actual as u64,
-    }
 }

@@ -116,21 +116,31 @@ fn offsets(field: &'static str, offsets: &[u32], row_count: usize, entry_count: 
 }
 
 /// Rest shape and triangles; gives V.
-fn mesh(rest_positions: &[[f32; 3]], faces: &[[u32; 3]]) -> Result<usize, OpenError> {
-    let vertex_count = rest_positions.len();
-    count("rest_positions", vertex_count, 3, limits::VERTICES)?;
+fn mesh(rest_positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Result<usize, OpenError> {
+    let vertex_count = positions(rest_positions, 3)?;
+    faces(triangles, vertex_count)?;
+    Ok(vertex_count)
+}
+
+/// At least `least` rest positions, finite and near enough; gives their count.
+fn positions(rest_positions: &[[f32; 3]], least: usize) -> Result<usize, OpenError> {
+    count("rest_positions", rest_positions.len(), least, limits::VERTICES)?;
     for (v, position) in rest_positions.iter().enumerate() {
         for &coordinate in position {
             within("rest_positions", v, coordinate, -limits::POSITION, limits::POSITION)?;
         }
     }
-    count("faces", faces.len(), 1, limits::FACES)?;
-    for (f, corners) in faces.iter().enumerate() {
+    Ok(rest_positions.len())
+}
+
+fn faces(triangles: &[[u32; 3]], vertex_count: usize) -> Result<(), OpenError> {
+    count("faces", triangles.len(), 1, limits::FACES)?;
+    for (f, corners) in triangles.iter().enumerate() {
         for &vertex in corners {
             below("faces", f, vertex, vertex_count)?;
         }
     }
-    Ok(vertex_count)
+    Ok(())
 }
 
 /// What the tree needs to know of a block.

@@ -5,7 +5,9 @@ mod compact;
 
 use alloc::string::String;
 
-use super::super::fixture::{COMPONENT_COUNT, TinyBaked, TinyCompact, VERTEX_COUNT, tiny_baked, tiny_compact};
+use super::super::fixture::{
+    COMPONENT_COUNT, TinyBaked, TinyCompact, TinyTier, VERTEX_COUNT, tiny_baked, tiny_compact,
+};
 use super::super::*;
 use OpenError::*;
 
@@ -50,7 +52,7 @@ fn counts(field: &'static str, expected: u64, actual: u64) -> OpenError {
 fn mesh_rules() {
     let field = "rest_positions";
     compact(|t| t.rest_positions[4][2] = f32::NAN, not_finite(field, 4));
-    baked(|t| t.rest_positions[8][0] = f32::INFINITY, not_finite(field, 8));
+    baked(|t| t.exact.rest_positions[8][0] = f32::INFINITY, not_finite(field, 8));
     let far = 2.0 * limits::POSITION;
     let (least, greatest) = (-limits::POSITION, limits::POSITION);
     compact(
@@ -263,8 +265,8 @@ fn every_message_names_its_fault() {
     assert!(alloc::format!("{kind}").contains("sinew bake"));
     let version = UnsupportedVersion {
         found: 9,
-        first: 1,
-        latest: 1,
+        first: FIRST_VERSION,
+        latest: FORMAT_VERSION,
     };
     assert!(alloc::format!("{version}").contains("version 9"));
 }
