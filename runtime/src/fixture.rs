@@ -6,7 +6,9 @@ use std::vec;
 use std::vec::Vec;
 
 use half::f16;
-use sinew_formats::package::{AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedTier, NONE, write_baked};
+use sinew_formats::package::{
+    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedTier, NONE, RenderMesh, write_baked,
+};
 
 use crate::basis::Basis;
 use crate::simd::scalar::naive::Noise;
@@ -240,6 +242,7 @@ impl Package {
                 entry_values: &values,
             },
             fast: None,
+            render: RenderMesh::NONE,
         })
         .unwrap();
         let rest_in_source_order = grid.solver_from_vertex.iter().map(|&s| grid.rest[s as usize]).collect();

@@ -6,7 +6,7 @@
 
 use rkyv::{Archive, Serialize, with::InlineAsBox};
 
-use super::FEATURE_COUNT;
+use super::{FEATURE_COUNT, RenderMesh};
 
 /// The frame path's data: V vertices, F faces, B blocks, K components.
 #[derive(Archive, Serialize, Debug)]
@@ -36,6 +36,8 @@ pub struct BakedBasis<'a> {
     pub exact: BakedTier<'a>,
     /// A tier of fewer nodes.
     pub fast: Option<BakedTier<'a>>,
+    /// What an engine draws.
+    pub render: RenderMesh<'a>,
 }
 
 /// What a frame reads from blend to solve, for a set of N nodes: all vertices, or a graph that stands for them. Solver

@@ -4,8 +4,9 @@ use rkyv::{api::low::access, rancor::Failure};
 
 use super::{
     ArchivedBakedBasis, ArchivedBakedTier, BakedBlock, BakedComponent, FEATURE_COUNT, Header, OpenError, PackageKind,
+    RenderMesh,
     open::{native, payload},
-    rules,
+    render, rules,
 };
 
 /// An opened baked package; borrows its bytes. Fields mean what [`super::BakedBasis`] says.
@@ -134,6 +135,11 @@ impl<'a> BakedView<'a> {
     /// The tier of fewer nodes, where the package has one.
     pub fn fast(&self) -> Option<TierView<'a>> {
         self.archived.fast.as_ref().map(|archived| TierView { archived })
+    }
+
+    /// What an engine draws; all empty where the source has no texture coordinates.
+    pub fn render_mesh(&self) -> RenderMesh<'a> {
+        render::view(&self.archived.render)
     }
 }
 

@@ -10,7 +10,7 @@ use half::f16;
 
 use super::{
     BakedBasis, BakedBlock, BakedComponent, BakedTier, BlockRecord, CompactBasis, ComponentRecord, FEATURE_COUNT,
-    GraphConvRecord, Header, NONE, PackageKind, Provenance, Quality, write_compact,
+    GraphConvRecord, Header, NONE, PackageKind, Provenance, Quality, RenderMesh, write_compact,
 };
 
 /// V of the grid.
@@ -38,6 +38,7 @@ pub struct TinyCompact {
     pub values: Vec<[u16; FEATURE_COUNT]>,
     pub provenance: Provenance<'static>,
     pub quality: Quality,
+    pub render: TinyRender,
 }
 
 /// Owns what a [`BakedBasis`] borrows; a test changes a field and writes.
@@ -54,6 +55,16 @@ pub struct TinyBaked {
     pub components: Vec<BakedComponent<'static>>,
     pub exact: TinyTier,
     pub fast: Option<TinyTier>,
+    pub render: TinyRender,
+}
+
+/// Owns what a [`RenderMesh`] borrows.
+#[derive(Debug, Clone, Default)]
+#[expect(missing_docs, reason = "fields are those of RenderMesh")]
+pub struct TinyRender {
+    pub vertices: Vec<u32>,
+    pub uvs: Vec<[f32; 2]>,
+    pub faces: Vec<[u32; 3]>,
 }
 
 /// Owns what a [`BakedTier`] borrows.
@@ -91,6 +102,7 @@ impl TinyCompact {
             values: &self.values,
             provenance: self.provenance,
             quality: self.quality,
+            render: self.render.mesh(),
         }
     }
 }
@@ -109,7 +121,43 @@ impl TinyBaked {
             components: &self.components,
             exact: self.exact.tier(),
             fast: self.fast.as_ref().map(TinyTier::tier),
+            render: self.render.mesh(),
         }
+    }
+}
+
+impl TinyRender {
+    fn mesh(&self) -> RenderMesh<'_> {
+        RenderMesh {
+            vertices: &self.vertices,
+            uvs: &self.uvs,
+            faces: &self.faces,
+        }
+    }
+
+    /// The texture folds along the middle column: the seam's vertices have one more texture coordinate for the triangles on
+    /// their right, whose texture is mirrored.
+    fn with_seam(rest_positions: &[[f32; 3]], faces: &[[u32; 3]]) -> Self {
+        let mut render = Self::default();
+        for face in faces {
+            let right = face.iter().any(|v| v % 3 == 2);
+            let corners = face.map(|v| {
+                let [x, y, _] = rest_positions[v as usize];
+                let uv = if right {
+                    [1.0 - 0.25 * x, 0.25 * y]
+                } else {
+                    [0.25 * x, 0.25 * y]
+                };
+                let known = (0..render.vertices.len()).find(|&r| render.vertices[r] == v && render.uvs[r] == uv);
+                known.unwrap_or_else(|| {
+                    render.vertices.push(v);
+                    render.uvs.push(uv);
+                    render.vertices.len() - 1
+                }) as u32
+            });
+            render.faces.push(corners);
+        }
+        render
     }
 }
 
@@ -196,6 +244,7 @@ pub fn tiny_compact() -> TinyCompact {
             steps: 30,
             steps_run: 40,
         },
+        render: TinyRender::with_seam(&rest_positions(), &faces()),
     }
 }
 
@@ -233,6 +282,7 @@ pub fn tiny_baked() -> TinyBaked {
         components: compact.components.iter().map(baked_component).collect(),
         exact,
         fast: None,
+        render: compact.render.clone(),
     }
 }
 

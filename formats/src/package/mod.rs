@@ -12,6 +12,7 @@ pub mod fixture;
 mod header;
 pub mod limits;
 mod open;
+mod render;
 mod rules;
 #[cfg(all(test, feature = "alloc"))]
 mod tests;
@@ -32,6 +33,7 @@ pub use error::OpenError;
 pub use file::{ReadError, SaveError, read_package, save_package};
 pub use header::{FIRST_VERSION, FORMAT_VERSION, HEADER_BYTES, Header, MAGIC, PAYLOAD_ALIGNMENT, PackageKind};
 pub use open::{CompactEntry, CompactView};
+pub use render::{ArchivedRenderMesh, RenderMesh};
 #[cfg(feature = "alloc")]
 pub use write::{AlignedBytes, WriteError, write_baked, write_compact};
 

@@ -199,10 +199,7 @@ impl Handles<'_> {
             gram: &mut memory.gram[..rows * rows],
             multipliers: &mut memory.multipliers[..rows],
         };
-        let levels = (0..basis.block_count())
-            .map(|b| basis.block(b).level)
-            .max()
-            .unwrap_or(0);
+        let levels = basis.components().map(|component| component.level).max().unwrap_or(0);
         for level in 0..=levels {
             reach.pass(self.caution * LEVEL_RIDGE, |k| basis.component(k).level == level);
         }

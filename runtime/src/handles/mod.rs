@@ -58,7 +58,8 @@ struct Sections {
 
 impl Sections {
     fn of(basis: &Basis<'_>, capacity: usize) -> Self {
-        let supports = (0..basis.block_count()).map(|b| basis.block(b).support_count as usize);
+        let tier = basis.exact();
+        let supports = (0..tier.block_count()).map(|b| tier.support(b).len());
         Self {
             capacity: capacity.min(HANDLES_MAX),
             vertices: basis.vertex_count(),
@@ -243,9 +244,9 @@ impl<'h> Handles<'h> {
         let (s, n) = (basis.solver_from_vertex()[vertex] as usize, self.count);
         workspace.solution.fill([0.0; 3]);
         workspace.solution[s][0] = 1.0;
-        substitute(&basis.factor(), workspace.solution);
+        substitute(&basis.exact().factor(), workspace.solution);
         let pull = &mut self.pulls[n * vertex_count..][..vertex_count];
-        adjoint::pull(&basis.rings(), basis.rest_positions(), workspace.solution, pull);
+        adjoint::pull(&basis.exact().rings(), basis.rest_positions(), workspace.solution, pull);
         let (rest, moved) = (basis.rest_positions()[s], workspace.displacement[s]);
         self.vertices[n] = vertex as u32;
         self.targets[n] = core::array::from_fn(|c| rest[c] + moved[c]);

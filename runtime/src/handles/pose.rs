@@ -7,7 +7,7 @@ use sinew_formats::package::FEATURE_COUNT;
 use super::Handles;
 use crate::basis::Basis;
 use crate::blend::{blend_block, components, flushed};
-use crate::decode::{decode, scales};
+use crate::decode::decode;
 use crate::simd::scalar::adjoint::{adjoints, derivative, displacement};
 use crate::simd::scalar::blend::Features;
 use crate::workspace::Workspace;
@@ -18,7 +18,7 @@ impl Handles<'_> {
     pub(super) fn evaluate(&mut self, basis: &Basis<'_>, workspace: &mut Workspace<'_>) -> bool {
         self.is_evaluated = false;
         self.blend(basis, workspace);
-        decode(basis, self.features, workspace.gradients);
+        decode(&basis.exact(), self.features, workspace.gradients);
         let vertex_count = basis.vertex_count();
         for n in 0..self.count {
             let pull = &self.pulls[n * vertex_count..][..vertex_count];
@@ -34,16 +34,19 @@ impl Handles<'_> {
         let weights = &mut self.memory.trial;
         weights.iter_mut().for_each(|w| *w = flushed(*w));
         self.features.fill([0.0; FEATURE_COUNT]);
-        for b in 0..basis.block_count() {
-            let block = basis.block(b);
+        let tier = basis.exact();
+        let mut remaining = &mut *self.slopes;
+        for b in 0..tier.block_count() {
+            let (block, support) = (tier.block(b), tier.support(b));
             let rest = block.bias.map(tanhf);
-            let slopes = &mut self.slopes[block.first_support as usize..][..block.support_count as usize];
+            let slopes;
+            (slopes, remaining) = remaining.split_at_mut(support.len());
             if weights[components(&block)].iter().all(|&w| w == 0.0) {
                 slopes.fill(rest.map(|y| 1.0 - y * y));
                 continue;
             }
-            let pre = blend_block(basis, &block, weights, workspace.pre_activations);
-            for ((&v, u), slope) in basis.support(&block).iter().zip(pre).zip(slopes) {
+            let pre = blend_block(&tier, b, weights, workspace.pre_activations);
+            for ((&v, u), slope) in support.iter().zip(pre).zip(slopes) {
                 let y: Features = core::array::from_fn(|c| tanhf(block.bias[c] + u[c]));
                 let feature = &mut self.features[v as usize];
                 for c in 0..FEATURE_COUNT {
@@ -57,27 +60,23 @@ impl Handles<'_> {
     /// Derivatives of the held vertices by every component that is not pinned, at the pose of the last
     /// [`Handles::evaluate`], into `self.memory.jacobian`: units of the source a unit of weight.
     pub(super) fn linearise(&mut self, basis: &Basis<'_>) {
-        let (rows, vertex_count) = (3 * self.count, basis.vertex_count());
+        let (rows, vertex_count, tier) = (3 * self.count, basis.vertex_count(), basis.exact());
         for n in 0..self.count {
             let pull = &self.pulls[n * vertex_count..][..vertex_count];
-            adjoints(scales(basis), self.features, pull, self.adjoints);
-            for b in 0..basis.block_count() {
-                let block = basis.block(b);
-                let slopes = &self.slopes[block.first_support as usize..][..block.support_count as usize];
-                for k in components(&block) {
+            adjoints(tier.scales(), self.features, pull, self.adjoints);
+            let mut remaining = &*self.slopes;
+            for b in 0..tier.block_count() {
+                let support = tier.support(b);
+                let slopes;
+                (slopes, remaining) = remaining.split_at(support.len());
+                for k in components(&tier.block(b)) {
                     let out = &mut self.memory.jacobian[k * rows + 3 * n..][..3];
                     if self.memory.pinned[k] == 1 {
                         out.fill(0.0);
                         continue;
                     }
-                    let entries = basis.entries(k);
-                    let moved = derivative(
-                        entries.slots,
-                        entries.values,
-                        basis.support(&block),
-                        slopes,
-                        self.adjoints,
-                    );
+                    let entries = tier.entries(k);
+                    let moved = derivative(entries.slots, entries.values, support, slopes, self.adjoints);
                     out.copy_from_slice(&moved.map(|x| entries.scale * x));
                 }
             }

@@ -6,7 +6,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use sinew_formats::package::{
     AlignedBytes, BlockRecord, CompactBasis, ComponentRecord, FEATURE_COUNT, GraphConvRecord, NONE, Provenance,
-    Quality, write_compact,
+    Quality, RenderMesh, write_compact,
 };
 
 use crate::mesh::topology::Topology;
@@ -135,6 +135,7 @@ pub fn compact(seed: u64, identity: bool) -> AlignedBytes {
             steps: 0,
             steps_run: 0,
         },
+        render: RenderMesh::NONE,
     });
     bytes.expect("the fixture keeps the format's rules")
 }

@@ -112,6 +112,7 @@ pub fn bake(package: &CompactView<'_>) -> Result<AlignedBytes, BakeError> {
             entry_values: &gathered.entry_values,
         },
         fast: None,
+        render: package.render_mesh(),
     })
     .map_err(BakeError::Refused)
 }

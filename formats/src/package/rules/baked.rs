@@ -2,7 +2,7 @@
 //! errors bear the same names.
 
 use super::{
-    super::{BakedView, OpenError, TierView, limits},
+    super::{BakedView, OpenError, TierView, limits, render},
     BlockLinks, ascending_below, below, control, count, faces, finite_halves, names, offsets, positions, positive,
     same_count, tree, within,
 };
@@ -42,7 +42,7 @@ pub(in super::super) fn check(view: &BakedView<'_>) -> Result<(), OpenError> {
         count("rest_positions", node_count, 1, vertex_count)?;
         tier(view, &fast)?;
     }
-    Ok(())
+    render::check(&view.render_mesh(), view.faces(), vertex_count)
 }
 
 /// Both lists have V indices < V and the second undoes the first, so both are permutations.
