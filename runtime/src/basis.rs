@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use sinew_formats::package::{BakedBlock, BakedView, FEATURE_COUNT, NONE, OpenError, TierView};
+use sinew_formats::package::{BakedBlock, BakedView, FEATURE_COUNT, NONE, OpenError, RenderMesh, TierView};
 
 use crate::simd::scalar::gradient::FeatureScales;
 use crate::simd::scalar::poisson::{Factor, Rings};
@@ -106,6 +106,19 @@ impl<'a> Basis<'a> {
     /// Triangles. Shape: `[F]`, source order, counter-clockwise.
     pub fn faces(&self) -> &'a [[u32; 3]] {
         self.view.faces()
+    }
+
+    /// What an engine draws: render vertices with texture coordinates; all empty where the package has none.
+    pub fn render_mesh(&self) -> RenderMesh<'a> {
+        self.view.render_mesh()
+    }
+
+    /// R: vertices that an engine draws. V where the package has no texture coordinates.
+    pub fn render_vertex_count(&self) -> usize {
+        match self.render_mesh().vertices.len() {
+            0 => self.vertex_count(),
+            count => count,
+        }
     }
 
     /// Rest shape. Shape: `[V]`, **solver** order, units of the source.
