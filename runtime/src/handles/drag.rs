@@ -11,10 +11,12 @@ use crate::workspace::Workspace;
 const STEPS: usize = 2;
 /// How weakly a level of components may act on the handles before it leaves the work to the next: what it moves them over
 /// its whole range, squared, in shares of the bounding box' diagonal (3 % of it).
-const LEVEL_RIDGE: f64 = 1e-3;
+const LEVEL_RIDGE: f64 = 1e-2;
 /// The same for all components together, at the end (0.2 % of it): what is left to reach is reached, unless it takes
 /// components that have next to nothing to do with it.
 const JOINT_RIDGE: f64 = 4e-6;
+/// How far a step brings a handle at most, as a share of the diagonal: farther than the linear problem is to be believed.
+const STRIDE: f64 = 0.04;
 /// How many times as strong the ridge is after a step that was worse than none. It lasts: mouse and mesh go on from here.
 const CAUTION: f64 = 16.0;
 /// How much of that a step that was good takes back.
@@ -172,9 +174,15 @@ impl Handles<'_> {
         let rows = 3 * self.count;
         let memory = &mut self.memory;
         let residual = &mut memory.residual[..rows];
-        for (i, left) in residual.iter_mut().enumerate() {
-            let (target, position) = (self.targets[i / 3][i % 3], self.positions[i / 3][i % 3]);
-            *left = (f64::from(target) - f64::from(position)) / self.diagonal;
+        for (n, left) in residual.chunks_exact_mut(3).enumerate() {
+            let (target, position) = (&self.targets[n], &self.positions[n]);
+            for c in 0..3 {
+                left[c] = (f64::from(target[c]) - f64::from(position[c])) / self.diagonal;
+            }
+            let way = libm::sqrt(left.iter().map(|x| x * x).sum());
+            if way > STRIDE {
+                left.iter_mut().for_each(|x| *x *= STRIDE / way);
+            }
         }
         // The steps are counted from the start, so what the known pose has moved since then is still to be reached.
         for (k, component) in basis.components().enumerate() {
