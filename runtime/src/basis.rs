@@ -2,10 +2,11 @@
 
 use core::fmt;
 
-use sinew_formats::package::{BakedBlock, BakedView, FEATURE_COUNT, NONE, OpenError, RenderMesh, TierView};
+use sinew_formats::package::{BakedBlock, BakedView, NONE, OpenError, RenderMesh, TierView};
 
-use crate::simd::scalar::gradient::FeatureScales;
+use crate::simd::decode::{FeatureScales, Tiles};
 use crate::simd::scalar::poisson::{Factor, Rings};
+use crate::simd::scalar::surface::{Around, Places};
 
 /// A baked package, checked. Borrows the bytes; cheap to copy; may be shared between threads, each with its own workspace.
 #[derive(Clone, Copy)]
@@ -146,6 +147,31 @@ impl<'a> Basis<'a> {
         self.view.stretch_scale()
     }
 
+    /// How the triangles lie around the vertices.
+    pub(crate) fn around(&self) -> Around<'a> {
+        Around {
+            offsets: self.view.fan_offsets(),
+            fans: self.view.fans(),
+            solver_from_lane: self.view.exact().solver_from_lane(),
+            vertex_from_solver: self.view.vertex_from_solver(),
+        }
+    }
+
+    /// Where the exact tier's nodes go.
+    pub(crate) fn places(&self) -> Places<'a> {
+        Places {
+            vertex_from_solver: self.view.vertex_from_solver(),
+            lane_from_solver: self.view.exact().lane_from_solver(),
+        }
+    }
+
+    /// Lanes of the exact tier in source order. Shape: `[V]`.
+    pub(crate) fn lanes(&self) -> impl ExactSizeIterator<Item = usize> + use<'a> {
+        let lane_from_solver = self.view.exact().lane_from_solver();
+        let solvers = self.view.solver_from_vertex().iter();
+        solvers.map(move |&solver| lane_from_solver[solver as usize] as usize)
+    }
+
     /// The tier whose nodes are the vertices.
     pub(crate) fn exact(&self) -> Tier<'a> {
         Tier {
@@ -176,11 +202,6 @@ impl<'a> Tier<'a> {
         self.basis.view.block(b)
     }
 
-    /// The block that component `k` is a latent of.
-    pub(crate) fn block_of(&self, k: usize) -> usize {
-        self.basis.view.component(k).block as usize
-    }
-
     /// What a network feature means.
     pub(crate) fn scales(&self) -> FeatureScales {
         FeatureScales {
@@ -194,18 +215,27 @@ impl<'a> Tier<'a> {
         self.nodes.rest_positions()
     }
 
-    /// Nodes of block `b`, solver order.
-    pub(crate) fn support(&self, b: usize) -> &'a [u32] {
-        self.nodes.support_of(b)
+    /// Multiplies the halves of component `k`.
+    pub(crate) fn value_scale(&self, k: usize) -> f32 {
+        self.basis.view.component(k).value_scale
     }
 
-    /// Entries of component `k`.
-    pub(crate) fn entries(&self, k: usize) -> Entries<'a> {
-        let (slots, values) = self.nodes.entries_of(k);
-        Entries {
-            slots,
-            values,
-            scale: self.basis.view.component(k).value_scale,
+    /// Solver index of each lane. Shape: `[N]`.
+    pub(crate) fn solver_from_lane(&self) -> &'a [u32] {
+        self.nodes.solver_from_lane()
+    }
+
+    /// Lane of each solver index. Shape: `[N]`.
+    pub(crate) fn lane_from_solver(&self) -> &'a [u32] {
+        self.nodes.lane_from_solver()
+    }
+
+    /// The components.
+    pub(crate) fn tiles(&self) -> Tiles<'a> {
+        Tiles {
+            offsets: self.nodes.tile_offsets(),
+            owners: self.nodes.tile_owners(),
+            values: self.nodes.tile_values(),
         }
     }
 
@@ -225,15 +255,6 @@ impl<'a> Tier<'a> {
             inverse_pivots: self.nodes.inverse_pivots(),
         }
     }
-}
-
-/// A component's sparse values: at place `slots[n]` of its block's support, `scale * values[n]`.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Entries<'a> {
-    pub(crate) slots: &'a [u32],
-    /// IEEE half bits.
-    pub(crate) values: &'a [[u16; FEATURE_COUNT]],
-    pub(crate) scale: f32,
 }
 
 #[cfg(test)]

@@ -1,10 +1,59 @@
-//! Decode: features to deformation gradients, at the scales of the package.
+//! Decode: the pose's weights to features and deformation gradients, where a weight has changed.
 
 use crate::basis::Tier;
-use crate::simd::scalar::blend::Features;
-use crate::simd::scalar::gradient;
+use crate::simd::Kernels;
+use crate::simd::decode::{BlockRest, Decoder, Group, Share};
+use crate::simd::lanes::Gradient;
 
-/// `D = T - I` of every node. Shape: both `[N]`.
-pub(crate) fn decode(tier: &Tier<'_>, features: &[Features], gradients: &mut [Features]) {
-    gradient::gradients(tier.scales(), features, gradients);
+/// Weights nearer to zero are zero: their products would be denormal and slow, and nobody sees them.
+const FLUSH_BELOW: f32 = 1e-6;
+/// Scaled weights end here: times the largest half they are finite, so that a blend never is infinity less infinity.
+const FACTOR_END: f32 = 5e33;
+
+/// A weight as the blend uses it.
+pub(crate) fn flushed(weight: f32) -> f32 {
+    if weight.abs() < FLUSH_BELOW { 0.0 } else { weight }
+}
+
+/// What component `k` counts at a weight.
+pub(crate) fn factor(tier: &Tier<'_>, k: usize, weight: f32) -> f32 {
+    let scaled = (weight * tier.value_scale(k)).clamp(-FACTOR_END, FACTOR_END);
+    if scaled.is_normal() { scaled } else { 0.0 }
+}
+
+/// Buffers of a pose that decode keeps from frame to frame.
+pub(crate) struct Decoded<'p> {
+    /// Shape: `[K]`.
+    pub(crate) shares: &'p mut [Share],
+    /// Shape: `[B]`.
+    pub(crate) blocks: &'p [BlockRest],
+    /// Shape: `[G]`.
+    pub(crate) features: &'p mut [Group<f32>],
+    /// Shape: `[N]`, solver order.
+    pub(crate) gradients: &'p mut [Gradient],
+}
+
+impl Decoded<'_> {
+    /// Brings features and gradients to `weights` `[K]`, flushed. `all` where the gradients are not those of the pose before.
+    pub(crate) fn update(self, tier: &Tier<'_>, kernels: Kernels, weights: &[f32], all: bool) {
+        for (k, (share, &weight)) in self.shares.iter_mut().zip(weights).enumerate() {
+            let factor = factor(tier, k, weight);
+            let changed = u32::from(factor != share.factor);
+            *share = Share { factor, changed };
+        }
+        let decoder = decoder(tier, self.shares, self.blocks, all);
+        kernels.decode(&decoder, self.features, self.gradients);
+    }
+}
+
+/// What the kernels read.
+pub(crate) fn decoder<'a>(tier: &Tier<'a>, shares: &'a [Share], blocks: &'a [BlockRest], all: bool) -> Decoder<'a> {
+    Decoder {
+        tiles: tier.tiles(),
+        shares,
+        blocks,
+        scales: tier.scales(),
+        places: tier.solver_from_lane(),
+        all,
+    }
 }

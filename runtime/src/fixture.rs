@@ -7,7 +7,7 @@ use std::vec::Vec;
 
 use half::f16;
 use sinew_formats::package::{
-    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedTier, NONE, RenderMesh, write_baked,
+    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedTier, Fans, NONE, RenderMesh, Tiles, write_baked,
 };
 
 use crate::basis::Basis;
@@ -185,8 +185,12 @@ impl Package {
             (0..count).filter(|s| s % 2 == 0).collect(),
         ];
         let (mut blocks, mut components) = (Vec::new(), Vec::new());
-        let (mut support_offsets, mut entry_offsets) = (vec![0], vec![0]);
-        let (mut support, mut slots, mut values) = (Vec::new(), Vec::new(), Vec::new());
+        let lane_from_solver: Vec<u32> = (0..count).map(|s| (s * 7 + 3) % count).collect();
+        let mut solver_from_lane = vec![0; count as usize];
+        for (s, &lane) in lane_from_solver.iter().enumerate() {
+            solver_from_lane[lane as usize] = s as u32;
+        }
+        let mut entries = Vec::new();
         let names: Vec<String> = (0..Self::COMPONENTS).map(|k| format!("c{k}")).collect();
         for (b, (parent, component_count)) in [(NONE, 2), (0, 1), (1, 2)].into_iter().enumerate() {
             blocks.push(BakedBlock {
@@ -200,11 +204,11 @@ impl Package {
                 let k = components.len();
                 for slot in 0..supports[b].len() as u32 {
                     if !(slot as usize + k).is_multiple_of(5) {
-                        slots.push(slot);
-                        values.push(noise.features().map(|x| f16::from_f32(0.125 * x).to_bits()));
+                        let solver = supports[b][slot as usize] as usize;
+                        let values = noise.features().map(|x| f16::from_f32(0.125 * x).to_bits());
+                        entries.push((k, b as u32, lane_from_solver[solver], values));
                     }
                 }
-                entry_offsets.push(slots.len() as u32);
                 components.push(BakedComponent {
                     name: &names[k],
                     block: b as u32,
@@ -213,9 +217,13 @@ impl Package {
                     value_scale: 4.0,
                 });
             }
-            support.extend(&supports[b]);
-            support_offsets.push(support.len() as u32);
         }
+        let tiles = Tiles::gather(grid.vertex_count(), entries);
+        let lane = |&s: &u32| lane_from_solver[s as usize];
+        let fans = Fans::gather(
+            &grid.faces,
+            &grid.solver_from_vertex.iter().map(lane).collect::<Vec<_>>(),
+        );
         let factor = factorise(&grid.laplacian());
         let bytes = write_baked(&BakedBasis {
             compact_id: [7; 16],
@@ -226,6 +234,8 @@ impl Package {
             stretch_scale: 0.4,
             blocks: &blocks,
             components: &components,
+            fan_offsets: &fans.fan_offsets,
+            fans: &fans.fans,
             exact: BakedTier {
                 rest_positions: &grid.rest,
                 ring_offsets: &grid.offsets,
@@ -235,11 +245,11 @@ impl Package {
                 factor_rows: &factor.rows,
                 factor_values: &factor.values,
                 inverse_pivots: &factor.inverse_pivots,
-                support_offsets: &support_offsets,
-                support: &support,
-                entry_offsets: &entry_offsets,
-                entry_slots: &slots,
-                entry_values: &values,
+                solver_from_lane: &solver_from_lane,
+                lane_from_solver: &lane_from_solver,
+                tile_offsets: &tiles.tile_offsets,
+                tile_owners: &tiles.tile_owners,
+                tile_values: &tiles.tile_values,
             },
             fast: None,
             render: RenderMesh::NONE,

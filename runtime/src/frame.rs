@@ -1,12 +1,10 @@
 //! Frame: the steps in order, from controls to positions and normals. What has not changed is not computed again.
 
 use crate::basis::Basis;
-use crate::blend::{blend, flushed};
 use crate::controls::Controls;
-use crate::decode::decode;
+use crate::decode::{Decoded, flushed};
 use crate::error::{Buffer, FrameError};
-use crate::normals::check_length;
-use crate::simd::scalar::surface;
+use crate::normals::{check_length, write_normals};
 use crate::solve::{emit, solve};
 use crate::workspace::Workspace;
 
@@ -66,17 +64,29 @@ impl Frame<'_> {
                 .zip(weights)
                 .for_each(|(to, from)| *to = from);
             let tier = self.basis.exact();
-            blend(&tier, workspace.weights, workspace.pre_activations, workspace.features);
-            decode(&tier, workspace.features, workspace.gradients);
+            let decoded = Decoded {
+                shares: workspace.shares,
+                blocks: workspace.blocks,
+                features: workspace.features,
+                gradients: workspace.gradients,
+            };
+            decoded.update(
+                &tier,
+                workspace.kernels,
+                workspace.weights,
+                workspace.gradients_are_stale,
+            );
+            workspace.gradients_are_stale = false;
             solve(&tier, workspace.gradients, workspace.displacement);
             FrameOutcome::Solved
         };
-        let emitted = emit(self.basis, workspace.displacement, self.positions);
+        let (bounds, emitted) = emit(self.basis, workspace.displacement, workspace.posed, self.positions);
+        workspace.bounds = bounds;
         if emitted.is_err() {
             workspace.rest();
         }
         if let Some(normals) = self.normals {
-            surface::normals(self.basis.faces(), self.positions, normals);
+            write_normals(self.basis, workspace.kernels, workspace.posed, normals);
         }
         emitted.map(|()| outcome)
     }
@@ -186,7 +196,7 @@ mod tests {
             positions: &positions,
             normals: &mut own,
         }
-        .run()
+        .run(&mut workspace)
         .unwrap();
         assert_eq!(own, normals);
         assert!(own.iter().all(|n| *n != FALLBACK_NORMAL));

@@ -1,7 +1,7 @@
 //! Sinew's runtime: weights of deformation components in, a deformed mesh out. `no_std`, no allocation, memory from the
 //! caller; every check that costs more than O(controls) happens once, in [`Basis::open`].
 //!
-//! Path of data, a frame: [`Controls`] -> blend (sparse folded components, tanh) -> decode (deformation gradients) ->
+//! Path of data, a frame: [`Controls`] -> decode (sparse blend of folded components, tanh, deformation gradients) ->
 //! solve (right-hand side, `L d = b`) -> positions -> [`Normals`]. [`Frame`] runs it; [`Tangent`] is its derivative along
 //! one control; [`Reconstruct`] enters it behind the network, with features of one's own.
 //!
@@ -30,7 +30,6 @@ mod basis;
 // Threads need compare-and-swap.
 #[cfg(target_has_atomic = "ptr")]
 mod batch;
-mod blend;
 mod controls;
 mod decode;
 mod error;
@@ -57,9 +56,9 @@ pub use frame::{Frame, FrameOutcome};
 pub use handles::{Drag, DragReport, HANDLES_MAX, HandleError, Handles, HandlesLayout};
 pub use linearize::Tangent;
 pub use normals::Normals;
-pub use output::{Attribute, AttributeName, BoundingBox, OutputError, UnitEncoding, VertexLayout, VertexOutput};
+pub use output::{Attribute, AttributeName, OutputError, UnitEncoding, VertexLayout, VertexOutput};
 pub use reconstruct::Reconstruct;
 pub use simd::Kernels;
-pub use simd::scalar::surface::FALLBACK_NORMAL;
+pub use simd::scalar::surface::{Bounds, FALLBACK_NORMAL};
 pub use sinew_formats::package::{FEATURE_COUNT, OpenError, RenderMesh};
 pub use workspace::{Workspace, WorkspaceLayout};

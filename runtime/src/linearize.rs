@@ -1,14 +1,10 @@
 //! Linearize: how the positions move when one weight does, exactly, at the workspace's pose. For fitting weights to
 //! positions by Gauss-Newton, offline and on dragged vertices.
 
-use sinew_formats::package::FEATURE_COUNT;
-
 use crate::basis::Basis;
-use crate::blend::blend_block;
+use crate::decode::decoder;
 use crate::error::{Buffer, FrameError};
 use crate::normals::check_length;
-use crate::simd::scalar::blend::activate_tangent;
-use crate::simd::scalar::gradient::gradient_tangent;
 use crate::solve::solve;
 use crate::workspace::Workspace;
 
@@ -52,27 +48,15 @@ impl Tangent<'_> {
     /// Those of [`Tangent::validate`]; [`FrameError::NotFinite`] when the derivative overflows: then the output is zero.
     pub fn run(self, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
         self.validate(workspace)?;
-        let Workspace {
-            weights,
-            features,
-            pre_activations,
-            gradients,
-            solution,
-            ..
-        } = workspace;
         let tier = self.basis.exact();
-        let b = tier.block_of(self.component);
-        let bias = tier.block(b).bias;
-        // The features are the sum of all blocks; the tanh of this one needs its own blend back.
-        let pre = blend_block(&tier, b, weights, pre_activations);
-        let support = tier.support(b);
-        let entries = tier.entries(self.component);
-        gradients.fill([0.0; FEATURE_COUNT]);
-        for (&slot, value) in entries.slots.iter().zip(entries.values) {
-            let v = support[slot as usize] as usize;
-            let dx = activate_tangent(&bias, &pre[slot as usize], value, entries.scale);
-            gradients[v] = gradient_tangent(tier.scales(), &features[v], &dx);
-        }
+        let decoder = decoder(&tier, workspace.shares, workspace.blocks, true);
+        let (features, gradients) = (&*workspace.features, &mut *workspace.gradients);
+        workspace.gradients_are_stale = true;
+        let scale = tier.value_scale(self.component);
+        workspace
+            .kernels
+            .tangents(&decoder, self.component, scale, features, gradients);
+        let solution = &mut *workspace.solution;
         solve(&tier, gradients, solution);
         for (d, &v) in solution.iter().zip(self.basis.vertex_from_solver()) {
             if !d.iter().all(|x| x.is_finite()) {

@@ -2,7 +2,8 @@
 
 use crate::basis::Basis;
 use crate::error::{Buffer, FrameError};
-use crate::simd::scalar::surface;
+use crate::simd::Kernels;
+use crate::workspace::Workspace;
 
 /// Unit vertex normals of the basis' triangles, weighted by area. A vertex without area gets
 /// [`FALLBACK_NORMAL`](crate::FALLBACK_NORMAL).
@@ -17,24 +18,33 @@ pub struct Normals<'j> {
 }
 
 impl Normals<'_> {
-    /// Checks the lengths.
+    /// Checks identity and lengths, O(1).
     ///
     /// # Errors
-    /// [`FrameError::WrongLength`].
-    pub fn validate(&self) -> Result<(), FrameError> {
+    /// [`FrameError::ForeignWorkspace`], [`FrameError::WrongLength`].
+    pub fn validate(&self, workspace: &Workspace<'_>) -> Result<(), FrameError> {
+        workspace.validate(self.basis)?;
         check_length(self.basis, Buffer::Positions, self.positions.len())?;
         check_length(self.basis, Buffer::Normals, self.normals.len())
     }
 
-    /// Computes the normals.
+    /// Computes the normals. The workspace lends its scratch; its pose stays.
     ///
     /// # Errors
     /// Those of [`Normals::validate`].
-    pub fn run(self) -> Result<(), FrameError> {
-        self.validate()?;
-        surface::normals(self.basis.faces(), self.positions, self.normals);
+    pub fn run(self, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
+        self.validate(workspace)?;
+        for (lane, p) in self.basis.lanes().zip(self.positions) {
+            workspace.posed[lane] = [p[0], p[1], p[2], 0.0];
+        }
+        write_normals(self.basis, workspace.kernels, workspace.posed, self.normals);
         Ok(())
     }
+}
+
+/// Normals of positions in lanes. Shape: both `[V]`, `normals` in source order.
+pub(crate) fn write_normals(basis: &Basis<'_>, kernels: Kernels, posed: &[[f32; 4]], normals: &mut [[f32; 3]]) {
+    kernels.normals(&basis.around(), posed, normals);
 }
 
 /// Refuses a buffer that has not one element a vertex.
@@ -56,27 +66,34 @@ mod tests {
     use std::vec;
 
     use super::*;
-    use crate::fixture::{Package, open};
+    use crate::fixture::{Package, memory_for, open, workspace_in};
 
     #[test]
     fn validity() {
-        let package = Package::small(1);
-        let basis = open(&package);
+        let (package, other) = (Package::small(1), Package::small(2));
+        let (basis, foreign) = (open(&package), open(&other));
         let count = basis.vertex_count();
-        let run = |positions: usize, normals: usize| {
+        let (mut memory, mut foreign_memory) = (memory_for(&basis), memory_for(&foreign));
+        let mut workspace = workspace_in(&basis, &mut memory);
+        let mut foreign_workspace = workspace_in(&foreign, &mut foreign_memory);
+        let run = |positions: usize, normals: usize, workspace: &mut Workspace<'_>| {
             let (positions, mut normals) = (vec![[0.0; 3]; positions], vec![[9.0; 3]; normals]);
             let outcome = Normals {
                 basis: &basis,
                 positions: &positions,
                 normals: &mut normals,
             }
-            .run();
+            .run(workspace);
             assert!(
                 outcome.is_ok() || normals.iter().all(|n| *n == [9.0; 3]),
                 "nothing was written"
             );
             outcome
         };
+        assert_eq!(
+            run(count, count, &mut foreign_workspace),
+            Err(FrameError::ForeignWorkspace)
+        );
         let short = |buffer, actual| {
             Err(FrameError::WrongLength {
                 buffer,
@@ -84,8 +101,11 @@ mod tests {
                 actual,
             })
         };
-        assert_eq!(run(count, count), Ok(()));
-        assert_eq!(run(count - 1, count), short(Buffer::Positions, count - 1));
-        assert_eq!(run(count, count + 1), short(Buffer::Normals, count + 1));
+        assert_eq!(run(count, count, &mut workspace), Ok(()));
+        assert_eq!(
+            run(count - 1, count, &mut workspace),
+            short(Buffer::Positions, count - 1)
+        );
+        assert_eq!(run(count, count + 1, &mut workspace), short(Buffer::Normals, count + 1));
     }
 }

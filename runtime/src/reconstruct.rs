@@ -2,13 +2,12 @@
 //! features and the solve lose by themselves.
 
 use crate::basis::Basis;
-use crate::decode::decode;
 use crate::error::{Buffer, FrameError};
 use crate::normals::check_length;
 use crate::solve::{emit, solve};
 use crate::workspace::Workspace;
 
-use sinew_formats::package::FEATURE_COUNT;
+use sinew_formats::package::{FEATURE_COUNT, GROUP_NODES};
 
 /// Positions of given features. The workspace lends its scratch; its pose stays.
 #[derive(Debug)]
@@ -43,16 +42,25 @@ impl Reconstruct<'_> {
     /// Those of [`Reconstruct::validate`]; [`FrameError::NotFinite`], and then the output holds the rest shape.
     pub fn run(self, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
         self.validate(workspace)?;
-        let Workspace {
-            gradients, solution, ..
-        } = workspace;
         let tier = self.basis.exact();
-        for (v, x) in self.features.iter().enumerate() {
-            let s = self.basis.solver_from_vertex()[v] as usize;
-            decode(&tier, core::slice::from_ref(x), &mut gradients[s..=s]);
+        workspace.gradients_are_stale = true;
+        // Vertices stand in groups of their own here: a kernel treats all lanes alike.
+        let places = self.basis.solver_from_vertex().chunks(GROUP_NODES);
+        for (features, places) in self.features.chunks(GROUP_NODES).zip(places) {
+            let mut group = [[0.0; GROUP_NODES]; FEATURE_COUNT];
+            for (n, x) in features.iter().enumerate() {
+                for c in 0..FEATURE_COUNT {
+                    group[c][n] = x[c];
+                }
+            }
+            workspace
+                .kernels
+                .gradients(tier.scales(), &group, places, workspace.gradients);
         }
-        solve(&tier, gradients, solution);
-        emit(self.basis, solution, self.positions)
+        solve(&tier, workspace.gradients, workspace.solution);
+        let (bounds, emitted) = emit(self.basis, workspace.solution, workspace.posed, self.positions);
+        workspace.bounds = bounds;
+        emitted
     }
 }
 
@@ -84,11 +92,7 @@ mod tests {
         }
         .run(&mut workspace)
         .unwrap();
-        let features: vec::Vec<_> = basis
-            .solver_from_vertex()
-            .iter()
-            .map(|&s| workspace.features()[s as usize])
-            .collect();
+        let features: vec::Vec<_> = workspace.features(&basis).collect();
         let mut again = vec![[0.0; 3]; basis.vertex_count()];
         Reconstruct {
             basis: &basis,

@@ -2,11 +2,14 @@
 //!
 //! A workspace always holds a pose that is finite and whole: the rest pose when new, then that of the last frame.
 
-use sinew_formats::package::FEATURE_COUNT;
+use sinew_formats::package::{FEATURE_COUNT, GROUP_NODES};
 
 use crate::basis::Basis;
 use crate::error::{FrameError, WorkspaceError};
 use crate::simd::Kernels;
+use crate::simd::decode::{BlockRest, Group, Share};
+use crate::simd::lanes::Gradient;
+use crate::simd::scalar::surface::Bounds;
 
 /// Start of every buffer: a cache line, and the widest vector register.
 pub(crate) const ALIGNMENT: usize = 64;
@@ -21,7 +24,7 @@ pub struct WorkspaceLayout {
 }
 
 impl WorkspaceLayout {
-    /// Layout for `basis`: about 132 bytes a vertex.
+    /// Layout for `basis`: about 124 bytes a vertex.
     pub fn for_basis(basis: &Basis<'_>) -> Self {
         let sections = Sections::of(basis);
         Self {
@@ -39,27 +42,33 @@ impl WorkspaceLayout {
 /// Element counts of the buffers, in the order in which they lie in memory.
 struct Sections {
     components: usize,
+    blocks: usize,
     nodes: usize,
-    largest_support: usize,
 }
 
 impl Sections {
     fn of(basis: &Basis<'_>) -> Self {
         let tier = basis.exact();
-        let supports = (0..tier.block_count()).map(|b| tier.support(b).len());
         Self {
             components: basis.component_count(),
+            blocks: basis.block_count(),
             nodes: tier.node_count(),
-            largest_support: supports.max().unwrap_or(0),
         }
     }
 
     /// The limits of the format keep this under a gigabyte, which fits 32 bits.
     fn size_bytes(&self) -> usize {
         section_bytes::<f32>(self.components)
-            + 2 * section_bytes::<[f32; FEATURE_COUNT]>(self.nodes)
-            + section_bytes::<[f32; FEATURE_COUNT]>(self.largest_support)
+            + section_bytes::<Share>(self.components)
+            + section_bytes::<BlockRest>(self.blocks)
+            + section_bytes::<Group<f32>>(self.groups())
+            + section_bytes::<Gradient>(self.nodes)
             + 2 * section_bytes::<[f32; 3]>(self.nodes)
+            + section_bytes::<[f32; 4]>(self.nodes)
+    }
+
+    fn groups(&self) -> usize {
+        self.nodes.div_ceil(GROUP_NODES)
     }
 }
 
@@ -77,16 +86,24 @@ pub struct Workspace<'w> {
     pub(crate) kernels: Kernels,
     /// Weights of the pose, tiny ones flushed. Shape: `[K]`.
     pub(crate) weights: &'w mut [f32],
-    /// Features of the pose, network units. Shape: `[V]`, solver order.
-    pub(crate) features: &'w mut [[f32; FEATURE_COUNT]],
+    /// What the components count in the pose. Shape: `[K]`.
+    pub(crate) shares: &'w mut [Share],
+    /// Constants of the basis and the kernels. Shape: `[B]`.
+    pub(crate) blocks: &'w mut [BlockRest],
+    /// Features of the pose, network units. Shape: `[G]`, lanes.
+    pub(crate) features: &'w mut [Group<f32>],
+    /// `D = T - I` of the pose, or scratch. Shape: `[V]`, solver order.
+    pub(crate) gradients: &'w mut [Gradient],
+    /// Whether another job has used the gradients since the last frame.
+    pub(crate) gradients_are_stale: bool,
     /// Displacement of the pose. Shape: `[V]`, solver order.
     pub(crate) displacement: &'w mut [[f32; 3]],
-    /// Scratch: a block's blend. Shape: `[largest support]`.
-    pub(crate) pre_activations: &'w mut [[f32; FEATURE_COUNT]],
-    /// Scratch: `D = T - I` or its derivative. Shape: `[V]`, solver order.
-    pub(crate) gradients: &'w mut [[f32; FEATURE_COUNT]],
     /// Scratch: a solve that is not the pose's. Shape: `[V]`, solver order.
     pub(crate) solution: &'w mut [[f32; 3]],
+    /// Scratch: positions for the normals. Shape: `[V]`, lanes.
+    pub(crate) posed: &'w mut [[f32; 4]],
+    /// Box of the positions last written.
+    pub(crate) bounds: Bounds,
 }
 
 impl<'w> Workspace<'w> {
@@ -119,27 +136,47 @@ impl<'w> Workspace<'w> {
         let memory = &mut memory[skipped..required_bytes];
         memory.fill(0);
         let (weights, memory) = carve(memory, sections.components);
-        let (features, memory) = carve(memory, sections.nodes);
-        let (displacement, memory) = carve(memory, sections.nodes);
-        let (pre_activations, memory) = carve(memory, sections.largest_support);
+        let (shares, memory) = carve(memory, sections.components);
+        let (blocks, memory) = carve::<BlockRest>(memory, sections.blocks);
+        let (features, memory) = carve(memory, sections.groups());
         let (gradients, memory) = carve(memory, sections.nodes);
-        let (solution, _) = carve(memory, sections.nodes);
+        let (displacement, memory) = carve(memory, sections.nodes);
+        let (solution, memory) = carve(memory, sections.nodes);
+        let (posed, _) = carve(memory, sections.nodes);
+        for (b, block) in blocks.iter_mut().enumerate() {
+            block.bias = basis.exact().block(b).bias;
+        }
+        kernels.rest_activations(blocks);
         let basis_id = basis.id();
         Ok(Self {
             basis_id,
             kernels,
             weights,
+            shares,
+            blocks,
             features,
-            displacement,
-            pre_activations,
             gradients,
+            gradients_are_stale: false,
+            displacement,
             solution,
+            posed,
+            bounds: Bounds::EMPTY,
         })
     }
 
-    /// Features of the pose, in network units. Shape: `[V]`, **solver** order; zero where no component reaches.
-    pub fn features(&self) -> &[[f32; FEATURE_COUNT]] {
-        self.features
+    /// Features of the pose, in network units; zero where no component reaches. Shape: `[V]`, source order.
+    ///
+    /// `basis` is the one that this workspace was made for; with another the features are those of other vertices, or none.
+    pub fn features(&self, basis: &Basis<'_>) -> impl Iterator<Item = [f32; FEATURE_COUNT]> {
+        basis.lanes().filter_map(|lane| {
+            let group = self.features.get(lane / GROUP_NODES)?;
+            Some(group.map(|row| row[lane % GROUP_NODES]))
+        })
+    }
+
+    /// Bounding box of the positions that the last job wrote: holds nothing, infinite and turned over, before the first.
+    pub fn bounds(&self) -> Bounds {
+        self.bounds
     }
 
     /// Weights of the pose; those under 1e-6 count as zero. Shape: `[K]`.
@@ -155,7 +192,10 @@ impl<'w> Workspace<'w> {
     /// Back to rest, which is exact.
     pub(crate) fn rest(&mut self) {
         self.weights.fill(0.0);
-        self.features.fill([0.0; FEATURE_COUNT]);
+        self.shares.fill(Share::default());
+        self.features.fill([[0.0; GROUP_NODES]; FEATURE_COUNT]);
+        self.gradients.fill([[0.0; 4]; 3]);
+        self.gradients_are_stale = false;
         self.displacement.fill([0.0; 3]);
     }
 
@@ -192,8 +232,8 @@ mod tests {
         for start in 0..70 {
             let workspace = Workspace::new(&basis, &mut memory[start..start + layout.unaligned_bytes()]).unwrap();
             assert_eq!(workspace.weights.len(), basis.component_count());
-            assert_eq!(workspace.features().len(), basis.vertex_count());
-            assert!(workspace.features().iter().all(|x| *x == [0.0; FEATURE_COUNT]));
+            assert_eq!(workspace.features(&basis).count(), basis.vertex_count());
+            assert!(workspace.features(&basis).all(|x| x == [0.0; FEATURE_COUNT]));
             assert_eq!(workspace.gradients.as_ptr().align_offset(ALIGNMENT), 0);
             assert_eq!(workspace.solution.as_ptr().align_offset(ALIGNMENT), 0);
         }
@@ -244,9 +284,10 @@ mod tests {
         let package = Package::small(1);
         let basis = open(&package);
         let layout = WorkspaceLayout::for_basis(&basis);
-        let exact = 4 * basis.component_count() + 132 * basis.vertex_count();
+        let lanes = basis.vertex_count().next_multiple_of(GROUP_NODES);
+        let exact = 12 * basis.component_count() + 72 * basis.block_count() + 36 * lanes + 88 * basis.vertex_count();
         assert!(
-            layout.size_bytes <= exact + 6 * layout.alignment,
+            layout.size_bytes <= exact + 8 * layout.alignment,
             "{} {exact}",
             layout.size_bytes
         );

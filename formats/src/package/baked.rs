@@ -6,7 +6,7 @@
 
 use rkyv::{Archive, Serialize, with::InlineAsBox};
 
-use super::{FEATURE_COUNT, RenderMesh};
+use super::{FAN_VERTICES, FEATURE_COUNT, GROUP_NODES, RenderMesh};
 
 /// The frame path's data: V vertices, F faces, B blocks, K components.
 #[derive(Archive, Serialize, Debug)]
@@ -32,6 +32,14 @@ pub struct BakedBasis<'a> {
     /// Components in block order. Shape: `[K]`.
     #[rkyv(with = InlineAsBox)]
     pub components: &'a [BakedComponent<'a>],
+    /// Compressed rows over `fans`, one for each [`FAN_VERTICES`] lanes of the exact tier, the last perhaps short.
+    /// Shape: `[ceil(V / FAN_VERTICES) + 1]`, starts at 0, never falls.
+    #[rkyv(with = InlineAsBox)]
+    pub fan_offsets: &'a [u32],
+    /// Lanes of the exact tier. Each vertex's own column walks around it: two in succession and the vertex are a triangle,
+    /// and the vertex itself parts fans and fills up.
+    #[rkyv(with = InlineAsBox)]
+    pub fans: &'a [[u32; FAN_VERTICES]],
     /// The tier whose nodes are the vertices: N = V.
     pub exact: BakedTier<'a>,
     /// A tier of fewer nodes.
@@ -68,21 +76,23 @@ pub struct BakedTier<'a> {
     /// `1 / D`, positive. Shape: `[N]`.
     #[rkyv(with = InlineAsBox)]
     pub inverse_pivots: &'a [f32],
-    /// Compressed rows over `support`, one a block. Shape: `[B + 1]`, starts at 0, never falls.
+    /// Solver index of each lane: the order in which a frame decodes, [`GROUP_NODES`] lanes a group, the last group
+    /// perhaps short. Shape: `[N]`, a permutation.
     #[rkyv(with = InlineAsBox)]
-    pub support_offsets: &'a [u32],
-    /// Nodes (solver indices, ascending within a block) that any of a block's components moves.
+    pub solver_from_lane: &'a [u32],
+    /// Shape: `[N]`, its inverse.
     #[rkyv(with = InlineAsBox)]
-    pub support: &'a [u32],
-    /// Compressed rows over `entry_slots`, one a component. Shape: `[K + 1]`, starts at 0, never falls.
+    pub lane_from_solver: &'a [u32],
+    /// Compressed rows over the tiles, one a group; G = ceil(N / GROUP_NODES). Shape: `[G + 1]`, starts at 0, never falls.
     #[rkyv(with = InlineAsBox)]
-    pub entry_offsets: &'a [u32],
-    /// For each entry of a component the place in its block's support, ascending within a component.
+    pub tile_offsets: &'a [u32],
+    /// Component of each tile, ascending within a group, and the block it belongs to. Shape: `[T]`.
     #[rkyv(with = InlineAsBox)]
-    pub entry_slots: &'a [u32],
-    /// Folded values `point C_k + neighbour mean C_k` as IEEE half bits, times the component's `value_scale`. Shape: that of `entry_slots`.
+    pub tile_owners: &'a [[u16; 2]],
+    /// Folded values `point C_k + neighbour mean C_k` as IEEE half bits, times the component's `value_scale`; zero where the
+    /// component does not reach, and beyond the last node. Shape: `[T]` of `[9][GROUP_NODES]`.
     #[rkyv(with = InlineAsBox)]
-    pub entry_values: &'a [[u16; FEATURE_COUNT]],
+    pub tile_values: &'a [[[u16; GROUP_NODES]; FEATURE_COUNT]],
 }
 
 /// One autoencoder block, folded: `x_v += tanh(bias + sum_k z_k C_k,v) - tanh(bias)` on its support.

@@ -3,8 +3,8 @@
 use rkyv::{api::low::access, rancor::Failure};
 
 use super::{
-    ArchivedBakedBasis, ArchivedBakedTier, BakedBlock, BakedComponent, FEATURE_COUNT, Header, OpenError, PackageKind,
-    RenderMesh,
+    ArchivedBakedBasis, ArchivedBakedTier, BakedBlock, BakedComponent, FAN_VERTICES, FEATURE_COUNT, GROUP_NODES,
+    Header, OpenError, PackageKind, RenderMesh,
     open::{native, payload},
     render, rules,
 };
@@ -125,6 +125,16 @@ impl<'a> BakedView<'a> {
         (0..view.component_count()).map(move |k| view.component(k))
     }
 
+    /// Shape: `[ceil(V / FAN_VERTICES) + 1]`, from 0 to `fans().len()`, never falls.
+    pub fn fan_offsets(&self) -> &'a [u32] {
+        native(&self.archived.fan_offsets)
+    }
+
+    /// Lanes of the exact tier, < V.
+    pub fn fans(&self) -> &'a [[u32; FAN_VERTICES]] {
+        native(&self.archived.fans)
+    }
+
     /// The tier whose nodes are the vertices.
     pub fn exact(&self) -> TierView<'a> {
         TierView {
@@ -189,47 +199,60 @@ impl<'a> TierView<'a> {
         native(&self.archived.inverse_pivots)
     }
 
-    /// Shape: `[B + 1]`, from 0 to `support().len()`, never falls.
-    pub fn support_offsets(&self) -> &'a [u32] {
-        native(&self.archived.support_offsets)
+    /// Shape: `[N]`, a permutation.
+    pub fn solver_from_lane(&self) -> &'a [u32] {
+        native(&self.archived.solver_from_lane)
     }
 
-    /// Solver indices < N, ascending within a block.
-    pub fn support(&self) -> &'a [u32] {
-        native(&self.archived.support)
+    /// Shape: `[N]`, its inverse.
+    pub fn lane_from_solver(&self) -> &'a [u32] {
+        native(&self.archived.lane_from_solver)
     }
 
-    /// Nodes that block `b` < B moves. Panics past the end, like a slice.
-    pub fn support_of(&self, b: usize) -> &'a [u32] {
-        row(self.support(), self.support_offsets(), b)
+    /// Shape: `[ceil(N / GROUP_NODES) + 1]`, from 0 to `tile_owners().len()`, never falls.
+    pub fn tile_offsets(&self) -> &'a [u32] {
+        native(&self.archived.tile_offsets)
     }
 
-    /// Shape: `[K + 1]`, from 0 to `entry_slots().len()`, never falls.
-    pub fn entry_offsets(&self) -> &'a [u32] {
-        native(&self.archived.entry_offsets)
+    /// Component < K and its block, ascending within a group. Shape: `[T]`.
+    pub fn tile_owners(&self) -> &'a [[u16; 2]] {
+        native(&self.archived.tile_owners)
     }
 
-    /// Places in the block's support, ascending within a component.
-    pub fn entry_slots(&self) -> &'a [u32] {
-        native(&self.archived.entry_slots)
+    /// Half bits, finite. Shape: `[T]`.
+    pub fn tile_values(&self) -> &'a [[[u16; GROUP_NODES]; FEATURE_COUNT]] {
+        native(&self.archived.tile_values)
     }
 
-    /// Half bits, finite. Shape: that of `entry_slots`.
-    pub fn entry_values(&self) -> &'a [[u16; FEATURE_COUNT]] {
-        native(&self.archived.entry_values)
-    }
-
-    /// Slots and values of component `k` < K. Panics past the end, like a slice.
-    pub fn entries_of(&self, k: usize) -> (&'a [u32], &'a [[u16; FEATURE_COUNT]]) {
-        let offsets = self.entry_offsets();
-        (
-            row(self.entry_slots(), offsets, k),
-            row(self.entry_values(), offsets, k),
-        )
+    /// What the tiles hold that is not zero, group by group.
+    pub fn entries(&self) -> impl Iterator<Item = TierEntry> + use<'a> {
+        let tier = *self;
+        let lanes = tier.solver_from_lane();
+        let groups = tier.tile_offsets().windows(2).zip(lanes.chunks(GROUP_NODES));
+        groups.flat_map(move |(row, lanes)| {
+            (row[0] as usize..row[1] as usize).flat_map(move |t| {
+                lanes.iter().enumerate().filter_map(move |(n, &solver)| {
+                    /// Without the sign: both zeros are zero.
+                    const MAGNITUDE: u16 = 0x7fff;
+                    let values = tier.tile_values()[t].map(|row| row[n]);
+                    values.iter().any(|half| half & MAGNITUDE != 0).then_some(TierEntry {
+                        component: usize::from(tier.tile_owners()[t][0]),
+                        solver: solver as usize,
+                        values,
+                    })
+                })
+            })
+        })
     }
 }
 
-/// Row `i` of compressed rows.
-fn row<'a, T>(entries: &'a [T], offsets: &[u32], i: usize) -> &'a [T] {
-    &entries[offsets[i] as usize..offsets[i + 1] as usize]
+/// Where one component moves one node of a tier.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TierEntry {
+    /// k < K.
+    pub component: usize,
+    /// Solver index < N.
+    pub solver: usize,
+    /// Half bits; times the component's `value_scale`.
+    pub values: [u16; FEATURE_COUNT],
 }

@@ -9,8 +9,9 @@ use alloc::vec::Vec;
 use half::f16;
 
 use super::{
-    BakedBasis, BakedBlock, BakedComponent, BakedTier, BlockRecord, CompactBasis, ComponentRecord, FEATURE_COUNT,
-    GraphConvRecord, Header, NONE, PackageKind, Provenance, Quality, RenderMesh, write_compact,
+    BakedBasis, BakedBlock, BakedComponent, BakedTier, BlockRecord, CompactBasis, ComponentRecord, FAN_VERTICES,
+    FEATURE_COUNT, Fans, GraphConvRecord, Header, NONE, PackageKind, Provenance, Quality, RenderMesh, Tile, Tiles,
+    write_compact,
 };
 
 /// V of the grid.
@@ -53,6 +54,8 @@ pub struct TinyBaked {
     pub stretch_scale: f32,
     pub blocks: Vec<BakedBlock>,
     pub components: Vec<BakedComponent<'static>>,
+    pub fan_offsets: Vec<u32>,
+    pub fans: Vec<[u32; FAN_VERTICES]>,
     pub exact: TinyTier,
     pub fast: Option<TinyTier>,
     pub render: TinyRender,
@@ -79,11 +82,11 @@ pub struct TinyTier {
     pub factor_rows: Vec<u32>,
     pub factor_values: Vec<f32>,
     pub inverse_pivots: Vec<f32>,
-    pub support_offsets: Vec<u32>,
-    pub support: Vec<u32>,
-    pub entry_offsets: Vec<u32>,
-    pub entry_slots: Vec<u32>,
-    pub entry_values: Vec<[u16; FEATURE_COUNT]>,
+    pub solver_from_lane: Vec<u32>,
+    pub lane_from_solver: Vec<u32>,
+    pub tile_offsets: Vec<u32>,
+    pub tile_owners: Vec<[u16; 2]>,
+    pub tile_values: Vec<Tile>,
 }
 
 impl TinyCompact {
@@ -119,6 +122,8 @@ impl TinyBaked {
             stretch_scale: self.stretch_scale,
             blocks: &self.blocks,
             components: &self.components,
+            fan_offsets: &self.fan_offsets,
+            fans: &self.fans,
             exact: self.exact.tier(),
             fast: self.fast.as_ref().map(TinyTier::tier),
             render: self.render.mesh(),
@@ -172,11 +177,11 @@ impl TinyTier {
             factor_rows: &self.factor_rows,
             factor_values: &self.factor_values,
             inverse_pivots: &self.inverse_pivots,
-            support_offsets: &self.support_offsets,
-            support: &self.support,
-            entry_offsets: &self.entry_offsets,
-            entry_slots: &self.entry_slots,
-            entry_values: &self.entry_values,
+            solver_from_lane: &self.solver_from_lane,
+            lane_from_solver: &self.lane_from_solver,
+            tile_offsets: &self.tile_offsets,
+            tile_owners: &self.tile_owners,
+            tile_values: &self.tile_values,
         }
     }
 }
@@ -258,6 +263,9 @@ pub fn tiny_baked() -> TinyBaked {
     let mut exact = TinyTier {
         rest_positions: VERTEX_FROM_SOLVER.map(|v| compact.rest_positions[v as usize]).to_vec(),
         ring_offsets: alloc::vec![0],
+        // Lanes against the order of elimination.
+        solver_from_lane: (0..VERTEX_COUNT as u32).rev().collect(),
+        lane_from_solver: (0..VERTEX_COUNT as u32).rev().collect(),
         ..TinyTier::default()
     };
     for row in 0..VERTEX_COUNT {
@@ -271,6 +279,9 @@ pub fn tiny_baked() -> TinyBaked {
     }
     factorize(&mut exact, solver_from_vertex[ANCHOR_VERTEX as usize] as usize);
     fold(&compact, &mut exact);
+    let lane_from_vertex = |&solver: &u32| exact.lane_from_solver[solver as usize];
+    let lanes: Vec<u32> = solver_from_vertex.iter().map(lane_from_vertex).collect();
+    let fans = Fans::gather(&compact.faces, &lanes);
     TinyBaked {
         compact_id: compact_id(&compact),
         faces: compact.faces.clone(),
@@ -280,6 +291,8 @@ pub fn tiny_baked() -> TinyBaked {
         stretch_scale: compact.stretch_scale,
         blocks: compact.blocks.iter().map(baked_block).collect(),
         components: compact.components.iter().map(baked_component).collect(),
+        fan_offsets: fans.fan_offsets,
+        fans: fans.fans,
         exact,
         fast: None,
         render: compact.render.clone(),
@@ -338,26 +351,20 @@ fn factorize(tier: &mut TinyTier, anchor: usize) {
 /// Multiplies the components by the decoders: `point C_k + neighbour mean C_k`, on supports grown by a ring.
 fn fold(compact: &TinyCompact, tier: &mut TinyTier) {
     let dense = dense_components(compact);
-    tier.support_offsets.push(0);
-    tier.entry_offsets.push(0);
-    for block in &compact.blocks {
-        let own = block.first_component as usize..(block.first_component + block.component_count) as usize;
-        let folded: Vec<Vec<[f32; FEATURE_COUNT]>> = own.map(|k| convolve(&block.decoder, &dense[k], tier)).collect();
-        let moves = |solver: usize| folded.iter().any(|component| component[solver] != [0.0; FEATURE_COUNT]);
-        let support: Vec<usize> = (0..VERTEX_COUNT).filter(|&solver| moves(solver)).collect();
-        for component in &folded {
-            for (slot, &solver) in support.iter().enumerate() {
-                if component[solver] != [0.0; FEATURE_COUNT] {
-                    tier.entry_slots.push(slot as u32);
-                    tier.entry_values
-                        .push(component[solver].map(|value| f16::from_f32(value).to_bits()));
-                }
+    let mut entries = Vec::new();
+    for (k, component) in compact.components.iter().enumerate() {
+        let decoder = &compact.blocks[component.block as usize].decoder;
+        for (solver, values) in convolve(decoder, &dense[k], tier).into_iter().enumerate() {
+            if values != [0.0; FEATURE_COUNT] {
+                let halves = values.map(|value| f16::from_f32(value).to_bits());
+                entries.push((k, component.block, tier.lane_from_solver[solver], halves));
             }
-            tier.entry_offsets.push(tier.entry_slots.len() as u32);
         }
-        tier.support.extend(support.iter().map(|&solver| solver as u32));
-        tier.support_offsets.push(tier.support.len() as u32);
     }
+    let tiles = Tiles::gather(VERTEX_COUNT, entries);
+    tier.tile_offsets = tiles.tile_offsets;
+    tier.tile_owners = tiles.tile_owners;
+    tier.tile_values = tiles.tile_values;
 }
 
 /// Components without their value scales. Shape: `[K][V]`, source order.

@@ -15,8 +15,12 @@ pub const FACTOR_ENTRIES: usize = 128 << 20;
 pub const COMPONENTS: usize = 4096;
 /// Autoencoder blocks: the root and at most one a component.
 pub const BLOCKS: usize = COMPONENTS + 1;
-/// Entries of all blocks' supports, and of all components, together.
+/// Entries of all components together.
 pub const ENTRIES: usize = 128 << 20;
+/// Tiles of all components together.
+pub const TILES: usize = 8 << 20;
+/// Steps of all fans together.
+pub const FANS: usize = 32 << 20;
 /// Shapes of the sequence.
 pub const SHAPES: usize = 16 << 20;
 

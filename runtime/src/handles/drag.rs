@@ -3,8 +3,8 @@
 use super::reach::Reach;
 use super::{HandleError, Handles};
 use crate::basis::Basis;
-use crate::blend::flushed;
 use crate::controls::Controls;
+use crate::decode::flushed;
 use crate::workspace::Workspace;
 
 /// Gauss-Newton steps an update. A drag is many updates, and each begins where the last ended.
@@ -31,7 +31,7 @@ const CAUTION_MAX: f64 = 65_536.0;
 /// squared steps. Coarse components go as far as they are of use, then finer ones, then all. Pinned components do not
 /// move. What no component can reach stays as near as it gets.
 ///
-/// The workspace lends scratch and keeps its pose; run a [`crate::Frame`] afterwards.
+/// The workspace lends its kernels and keeps its pose; run a [`crate::Frame`] afterwards.
 #[derive(Debug)]
 pub struct Drag<'j, 'h, 'c> {
     /// The opened package.
@@ -89,7 +89,7 @@ impl Drag<'_, '_, '_> {
                 break;
             }
             if !is_linearised {
-                handles.linearise(basis);
+                handles.linearise(basis, workspace);
                 handles.scale_jacobian(basis);
                 is_linearised = true;
             }

@@ -13,10 +13,12 @@ mod reach;
 pub use drag::{Drag, DragReport};
 pub use error::HandleError;
 
+use sinew_formats::package::GROUP_NODES;
+
 use crate::basis::Basis;
 use crate::error::WorkspaceError;
-use crate::simd::scalar::adjoint::{self, Adjoint};
-use crate::simd::scalar::blend::Features;
+use crate::simd::adjoint::{HeldSums, Pull, TOGETHER, pull};
+use crate::simd::decode::{Group, Share};
 use crate::simd::scalar::poisson::substitute;
 use crate::workspace::{ALIGNMENT, Workspace, carve, section_bytes};
 
@@ -34,7 +36,7 @@ pub struct HandlesLayout {
 
 impl HandlesLayout {
     /// Layout for `capacity` handles, of which more than [`HANDLES_MAX`] count as that many: 12 bytes a vertex for each of
-    /// them, 144 a vertex for all, and 36 for each vertex of each block's support.
+    /// them, 36 a vertex for all, and about 800 a component.
     pub fn for_basis(basis: &Basis<'_>, capacity: usize) -> Self {
         Self {
             size_bytes: Sections::of(basis, capacity).size_bytes(),
@@ -51,20 +53,16 @@ impl HandlesLayout {
 /// Element counts of the buffers.
 struct Sections {
     capacity: usize,
-    vertices: usize,
+    groups: usize,
     components: usize,
-    supports: usize,
 }
 
 impl Sections {
     fn of(basis: &Basis<'_>, capacity: usize) -> Self {
-        let tier = basis.exact();
-        let supports = (0..tier.block_count()).map(|b| tier.support(b).len());
         Self {
             capacity: capacity.min(HANDLES_MAX),
-            vertices: basis.vertex_count(),
+            groups: basis.vertex_count().div_ceil(GROUP_NODES),
             components: basis.component_count(),
-            supports: supports.sum(),
         }
     }
 
@@ -79,10 +77,11 @@ impl Sections {
         [
             section_bytes::<u32>(handles),
             3 * section_bytes::<[f32; 3]>(handles),
-            section_bytes::<[f32; 3]>(handles.saturating_mul(self.vertices)),
-            section_bytes::<Features>(self.vertices),
-            section_bytes::<Features>(self.supports),
-            section_bytes::<Adjoint>(self.vertices),
+            section_bytes::<Pull>(handles.saturating_mul(self.groups)),
+            section_bytes::<Group<f32>>(self.groups),
+            section_bytes::<HeldSums>(handles.div_ceil(TOGETHER)),
+            section_bytes::<HeldSums>(self.components),
+            section_bytes::<Share>(self.components),
             8 * section_bytes::<f32>(self.components),
             section_bytes::<f32>(rows * self.components),
             section_bytes::<f64>(rows * rows),
@@ -113,14 +112,16 @@ pub struct Handles<'h> {
     positions: &'h mut [[f32; 3]],
     /// Held vertices at a step that may be taken. Shape: `[capacity]`.
     trial_positions: &'h mut [[f32; 3]],
-    /// Shape: `[capacity][V]`, solver order.
-    pulls: &'h mut [[f32; 3]],
-    /// Shape: `[V]`, solver order.
-    features: &'h mut [Features],
-    /// `1 - tanh^2` of each block on its support. Shape: `[sum of support_count]`.
-    slopes: &'h mut [Features],
-    /// Of one handle at a time. Shape: `[V]`, solver order.
-    adjoints: &'h mut [Adjoint],
+    /// Shape: `[capacity][G]`, lanes.
+    pulls: &'h mut [Pull],
+    /// Shape: `[G]`, lanes.
+    features: &'h mut [Group<f32>],
+    /// Shape: `[ceil(capacity / TOGETHER)]`.
+    held_sums: &'h mut [HeldSums],
+    /// Shape: `[K]`.
+    derivative_sums: &'h mut [HeldSums],
+    /// Of the weights that were evaluated. Shape: `[K]`.
+    shares: &'h mut [Share],
     memory: Memory<'h>,
 }
 
@@ -175,10 +176,11 @@ impl<'h> Handles<'h> {
         let (targets, memory) = carve(memory, handles);
         let (positions, memory) = carve(memory, handles);
         let (trial_positions, memory) = carve(memory, handles);
-        let (pulls, memory) = carve(memory, handles * sections.vertices);
-        let (features, memory) = carve(memory, sections.vertices);
-        let (slopes, memory) = carve(memory, sections.supports);
-        let (adjoints, memory) = carve(memory, sections.vertices);
+        let (pulls, memory) = carve(memory, handles * sections.groups);
+        let (features, memory) = carve(memory, sections.groups);
+        let (held_sums, memory) = carve(memory, handles.div_ceil(TOGETHER));
+        let (derivative_sums, memory) = carve(memory, components);
+        let (shares, memory) = carve(memory, components);
         let (pinned, memory) = carve(memory, components);
         let (is_free, memory) = carve(memory, components);
         let (evaluated, memory) = carve(memory, components);
@@ -203,8 +205,9 @@ impl<'h> Handles<'h> {
             trial_positions,
             pulls,
             features,
-            slopes,
-            adjoints,
+            held_sums,
+            derivative_sums,
+            shares,
             memory: Memory {
                 pinned,
                 is_free,
@@ -245,8 +248,16 @@ impl<'h> Handles<'h> {
         workspace.solution.fill([0.0; 3]);
         workspace.solution[s][0] = 1.0;
         substitute(&basis.exact().factor(), workspace.solution);
-        let pull = &mut self.pulls[n * vertex_count..][..vertex_count];
-        adjoint::pull(&basis.exact().rings(), basis.rest_positions(), workspace.solution, pull);
+        let tier = basis.exact();
+        let group_count = self.features.len();
+        let own = &mut self.pulls[n * group_count..][..group_count];
+        pull(
+            &tier.rings(),
+            tier.rest_positions(),
+            workspace.solution,
+            tier.lane_from_solver(),
+            own,
+        );
         let (rest, moved) = (basis.rest_positions()[s], workspace.displacement[s]);
         self.vertices[n] = vertex as u32;
         self.targets[n] = core::array::from_fn(|c| rest[c] + moved[c]);
@@ -261,12 +272,12 @@ impl<'h> Handles<'h> {
     /// [`HandleError::NotHeld`].
     pub fn remove(&mut self, vertex: usize) -> Result<(), HandleError> {
         let n = self.index_of(vertex)?;
-        let vertex_count = self.features.len();
+        let group_count = self.features.len();
         self.count -= 1;
         self.vertices.copy_within(n + 1..=self.count, n);
         self.targets.copy_within(n + 1..=self.count, n);
-        let (first, last) = ((n + 1) * vertex_count, (self.count + 1) * vertex_count);
-        self.pulls.copy_within(first..last, n * vertex_count);
+        let (first, last) = ((n + 1) * group_count, (self.count + 1) * group_count);
+        self.pulls.copy_within(first..last, n * group_count);
         self.is_evaluated = false;
         Ok(())
     }

@@ -14,21 +14,13 @@ pub use layout::{Attribute, AttributeName, UnitEncoding, VertexLayout};
 use crate::basis::Basis;
 use crate::error::Buffer;
 use crate::normals::check_length;
-
-/// The box around all positions, sides along the axes. Units of the source.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BoundingBox {
-    /// Least x, y and z.
-    pub minimum: [f32; 3],
-    /// Greatest x, y and z.
-    pub maximum: [f32; 3],
-}
+use crate::simd::scalar::surface::Bounds;
 
 /// Writes the vertices of a frame into a vertex buffer. For buffers in separate memory run it once for each.
 ///
 /// ```
-/// # use sinew_runtime::{Attribute, Basis, BoundingBox, OutputError, UnitEncoding, VertexLayout, VertexOutput};
-/// # fn upload(basis: &Basis<'_>, positions: &[[f32; 3]], normals: &[[f32; 3]], bytes: &mut [u8]) -> Result<BoundingBox, OutputError> {
+/// # use sinew_runtime::{Attribute, Basis, Bounds, OutputError, UnitEncoding, VertexLayout, VertexOutput};
+/// # fn upload(basis: &Basis<'_>, positions: &[[f32; 3]], normals: &[[f32; 3]], bytes: &mut [u8]) -> Result<Bounds, OutputError> {
 /// let at = |offset_bytes| Some(Attribute { offset_bytes, stride_bytes: 20 });
 /// let layout = VertexLayout {
 ///     positions: at(0),                  // 12 bytes
@@ -93,7 +85,7 @@ impl VertexOutput<'_> {
     ///
     /// # Errors
     /// Those of [`VertexOutput::validate`]; then nothing was written.
-    pub fn run(self) -> Result<BoundingBox, OutputError> {
+    pub fn run(self) -> Result<Bounds, OutputError> {
         self.validate()?;
         let Self {
             basis,
@@ -133,7 +125,9 @@ impl VertexOutput<'_> {
         if let Some(at) = layout.texture_coordinates {
             spread(bytes, at, &[], render.uvs, |uv| bytemuck::cast::<_, [u8; 8]>(*uv));
         }
-        Ok(bounding_box(positions))
+        let mut bounds = Bounds::EMPTY;
+        positions.iter().for_each(|p| bounds.include(p));
+        Ok(bounds)
     }
 }
 
@@ -163,20 +157,6 @@ fn snorm16(v: &[f32; 4]) -> [u8; 8] {
 
 fn snorm8(v: &[f32; 4]) -> [u8; 4] {
     bytemuck::cast(v.map(|x| libm::roundf(x.clamp(-1.0, 1.0) * 127.0) as i8))
-}
-
-fn bounding_box(positions: &[[f32; 3]]) -> BoundingBox {
-    let mut found = BoundingBox {
-        minimum: [f32::INFINITY; 3],
-        maximum: [f32::NEG_INFINITY; 3],
-    };
-    for p in positions {
-        for c in 0..3 {
-            found.minimum[c] = found.minimum[c].min(p[c]);
-            found.maximum[c] = found.maximum[c].max(p[c]);
-        }
-    }
-    found
 }
 
 #[cfg(test)]

@@ -9,7 +9,6 @@
 use libm::sqrtf;
 
 use crate::basis::Basis;
-use crate::simd::scalar::gradient::cross;
 
 /// Fills `tangents`. Shape: `positions` and `normals` `[V]`, source order; `tangents` `[R]`. Where a vertex' triangles say nothing
 /// (no area, or none in the texture) its tangent is some unit vector perpendicular to the normal.
@@ -76,6 +75,14 @@ fn unit(t: &[f32; 3]) -> Option<[f32; 3]> {
     let m = t.map(|x| x / largest);
     let length = norm(&m);
     (length.is_finite() && length > 0.0).then(|| m.map(|x| x / length))
+}
+
+fn cross(a: &[f32; 3], b: &[f32; 3]) -> [f32; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
 }
 
 fn norm(a: &[f32; 3]) -> f32 {

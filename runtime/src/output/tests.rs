@@ -47,7 +47,7 @@ fn write(
     [positions, normals]: &[Vec<[f32; 3]>; 2],
     layout: VertexLayout,
     bytes: &mut [u8],
-) -> BoundingBox {
+) -> Bounds {
     let mut scratch = vec![[f32::NAN; 4]; basis.render_vertex_count()];
     let job = VertexOutput {
         basis,

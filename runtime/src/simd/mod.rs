@@ -3,7 +3,52 @@
 //! [`scalar`] is the reference; every other kernel equals it within a named tolerance. Which ones run is decided once, when
 //! a workspace is made: by what the processor says on x86-64, at compile time elsewhere.
 
+pub(crate) mod adjoint;
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+pub(crate) mod decode;
+mod functions;
+pub(crate) mod lanes;
 pub(crate) mod scalar;
+
+use adjoint::{HeldSums, Pull};
+use decode::{BlockRest, Decoder, FeatureScales, Group};
+use lanes::{Gradient, One};
+use scalar::surface::{self, Around};
+
+/// A kernel of decode, by the set that it belongs to.
+macro_rules! dispatch {
+    ($name:ident ( $($argument:ident : $type:ty),* )) => {
+        #[doc = concat!("See [`decode::", stringify!($name), "`].")]
+        pub(crate) fn $name(self, $($argument: $type),*) {
+            match self {
+                #[cfg(target_arch = "x86_64")]
+                Self::Avx512 => avx512::$name($($argument),*),
+                #[cfg(target_arch = "x86_64")]
+                Self::Avx2 => avx2::$name($($argument),*),
+                _ => decode::$name::<One>($($argument),*),
+            }
+        }
+    };
+}
+
+impl Kernels {
+    /// See [`surface::normals`].
+    pub(crate) fn normals(self, around: &Around<'_>, posed: &[[f32; 4]], normals: &mut [[f32; 3]]) {
+        match self {
+            _ => surface::normals(around, posed, normals),
+        }
+    }
+
+    dispatch!(rest_activations(blocks: &mut [BlockRest]));
+    dispatch!(decode(decoder: &Decoder<'_>, features: &mut [Group<f32>], gradients: &mut [Gradient]));
+    dispatch!(gradients(scales: FeatureScales, features: &Group<f32>, places: &[u32], gradients: &mut [Gradient]));
+    dispatch!(held(decoder: &Decoder<'_>, pulls: &[Pull], features: &mut [Group<f32>], sums: &mut [HeldSums]));
+    dispatch!(derivatives(decoder: &Decoder<'_>, pulls: &[Pull], features: &[Group<f32>], sums: &mut [HeldSums]));
+    dispatch!(tangents(decoder: &Decoder<'_>, k: usize, scale: f32, features: &[Group<f32>], gradients: &mut [Gradient]));
+}
 
 /// A set of kernels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -6,16 +6,19 @@
 
 pub mod factor;
 pub mod fold;
+pub mod groups;
 pub mod mesh;
 pub mod sparse;
 mod surface;
 
 use sinew_formats::package::{
-    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedTier, CompactView, OpenError, WriteError, write_baked,
+    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedTier, CompactView, Fans, OpenError, WriteError,
+    write_baked,
 };
 
 use factor::{AnchoredLaplacian, EliminationOrder, Factor};
-use fold::{FoldFrame, FoldedBlocks, FoldedComponent};
+use fold::{FoldFrame, FoldedComponent};
+use groups::LaneOrder;
 pub use surface::Surface;
 
 /// Why a package cannot be baked.
@@ -64,8 +67,16 @@ pub fn bake(package: &CompactView<'_>) -> Result<AlignedBytes, BakeError> {
         .collect();
 
     let folded = fold_package(package, &surface, &order);
-    let component_counts: Vec<usize> = package.blocks().map(|block| block.component_count as usize).collect();
-    let gathered = FoldedBlocks::gather(&folded, &component_counts);
+    let degrees: Vec<usize> = rings.offsets.windows(2).map(|row| (row[1] - row[0]) as usize).collect();
+    let lanes = LaneOrder::new(&folded, &groups::nearby(&rest_positions), &degrees);
+    let block_of_component: Vec<u32> = package.components().map(|component| component.block).collect();
+    let tiles = lanes.tiles(&folded, &block_of_component);
+    let lane_from_vertex: Vec<u32> = order
+        .solver_from_vertex
+        .iter()
+        .map(|&solver| lanes.lane_from_solver[solver as usize])
+        .collect();
+    let fans = Fans::gather(package.faces(), &lane_from_vertex);
     let blocks: Vec<BakedBlock> = package
         .blocks()
         .map(|block| BakedBlock {
@@ -96,6 +107,8 @@ pub fn bake(package: &CompactView<'_>) -> Result<AlignedBytes, BakeError> {
         stretch_scale: package.stretch_scale(),
         blocks: &blocks,
         components: &components,
+        fan_offsets: &fans.fan_offsets,
+        fans: &fans.fans,
         exact: BakedTier {
             rest_positions: &rest_positions,
             ring_offsets: &rings.offsets,
@@ -105,11 +118,11 @@ pub fn bake(package: &CompactView<'_>) -> Result<AlignedBytes, BakeError> {
             factor_rows: &factor.rows,
             factor_values: &factor.values,
             inverse_pivots: &factor.inverse_pivots,
-            support_offsets: &gathered.support_offsets,
-            support: &gathered.support,
-            entry_offsets: &gathered.entry_offsets,
-            entry_slots: &gathered.entry_slots,
-            entry_values: &gathered.entry_values,
+            solver_from_lane: &lanes.solver_from_lane,
+            lane_from_solver: &lanes.lane_from_solver,
+            tile_offsets: &tiles.tile_offsets,
+            tile_owners: &tiles.tile_owners,
+            tile_values: &tiles.tile_values,
         },
         fast: None,
         render: package.render_mesh(),

@@ -2,7 +2,7 @@
 //! errors bear the same names.
 
 use super::{
-    super::{BakedView, OpenError, TierView, limits, render},
+    super::{BakedView, FAN_VERTICES, GROUP_NODES, OpenError, TierView, limits, render},
     BlockLinks, ascending_below, below, control, count, faces, finite_halves, names, offsets, positions, positive,
     same_count, tree, within,
 };
@@ -11,7 +11,12 @@ use super::{
 pub(in super::super) fn check(view: &BakedView<'_>) -> Result<(), OpenError> {
     let vertex_count = positions(view.exact().rest_positions(), 3)?;
     faces(view.faces(), vertex_count)?;
-    permutation(view, vertex_count)?;
+    permutation(
+        ["solver_from_vertex", "vertex_from_solver"],
+        [view.solver_from_vertex(), view.vertex_from_solver()],
+        vertex_count,
+    )?;
+    fans(view, vertex_count)?;
     positive("rotation_scale", 0, view.rotation_scale(), limits::FEATURE_SCALE)?;
     positive("stretch_scale", 0, view.stretch_scale(), limits::FEATURE_SCALE)?;
     let links = |b| {
@@ -45,17 +50,16 @@ pub(in super::super) fn check(view: &BakedView<'_>) -> Result<(), OpenError> {
     render::check(&view.render_mesh(), view.faces(), vertex_count)
 }
 
-/// Both lists have V indices < V and the second undoes the first, so both are permutations.
-fn permutation(view: &BakedView<'_>, vertex_count: usize) -> Result<(), OpenError> {
-    let (solver_from_vertex, vertex_from_solver) = (view.solver_from_vertex(), view.vertex_from_solver());
-    same_count("solver_from_vertex", solver_from_vertex.len(), vertex_count)?;
-    same_count("vertex_from_solver", vertex_from_solver.len(), vertex_count)?;
-    for (v, &solver) in solver_from_vertex.iter().enumerate() {
-        below("solver_from_vertex", v, solver, vertex_count)?;
-        if vertex_from_solver[solver as usize] as usize != v {
+/// Both lists have `count` indices < `count` and the second undoes the first, so both are permutations.
+fn permutation(fields: [&'static str; 2], lists: [&[u32]; 2], count: usize) -> Result<(), OpenError> {
+    same_count(fields[0], lists[0].len(), count)?;
+    same_count(fields[1], lists[1].len(), count)?;
+    for (index, &image) in lists[0].iter().enumerate() {
+        below(fields[0], index, image, count)?;
+        if lists[1][image as usize] as usize != index {
             return Err(OpenError::NotAPermutation {
-                field: "solver_from_vertex",
-                index: v,
+                field: fields[0],
+                index,
             });
         }
     }
@@ -66,8 +70,8 @@ fn permutation(view: &BakedView<'_>, vertex_count: usize) -> Result<(), OpenErro
 fn tier(view: &BakedView<'_>, tier: &TierView<'_>) -> Result<(), OpenError> {
     rings(tier)?;
     factor(tier)?;
-    supports(view, tier)?;
-    entries(view, tier)
+    lanes(tier)?;
+    tiles(view, tier)
 }
 
 fn rings(tier: &TierView<'_>) -> Result<(), OpenError> {
@@ -136,36 +140,63 @@ fn factor(tier: &TierView<'_>) -> Result<(), OpenError> {
     Ok(())
 }
 
-fn supports(view: &BakedView<'_>, tier: &TierView<'_>) -> Result<(), OpenError> {
-    let support = tier.support();
-    count("support", support.len(), 0, limits::ENTRIES)?;
-    offsets(
-        "support_offsets",
-        tier.support_offsets(),
-        view.block_count(),
-        support.len(),
-    )?;
-    for b in 0..view.block_count() {
-        let start = tier.support_offsets()[b] as usize;
-        ascending_below("support", start, tier.support_of(b), tier.node_count())?;
+fn lanes(tier: &TierView<'_>) -> Result<(), OpenError> {
+    permutation(
+        ["solver_from_lane", "lane_from_solver"],
+        [tier.solver_from_lane(), tier.lane_from_solver()],
+        tier.node_count(),
+    )
+}
+
+fn tiles(view: &BakedView<'_>, tier: &TierView<'_>) -> Result<(), OpenError> {
+    let (owners, values) = (tier.tile_owners(), tier.tile_values());
+    count("tile_owners", owners.len(), 0, limits::TILES)?;
+    same_count("tile_values", values.len(), owners.len())?;
+    let group_count = tier.node_count().div_ceil(GROUP_NODES);
+    offsets("tile_offsets", tier.tile_offsets(), group_count, owners.len())?;
+    for row in tier.tile_offsets().windows(2) {
+        let mut previous = None;
+        for index in row[0] as usize..row[1] as usize {
+            let [component, block] = owners[index];
+            below("tile_owners", index, u32::from(component), view.component_count())?;
+            if previous.is_some_and(|previous| component <= previous) {
+                return Err(OpenError::NotAscending {
+                    field: "tile_owners",
+                    index,
+                });
+            }
+            // Components stand in block order, so the blocks ascend too.
+            if view.component(component as usize).block != u32::from(block) {
+                return Err(OpenError::NotContiguous {
+                    field: "tile_owners",
+                    index,
+                });
+            }
+            previous = Some(component);
+        }
+    }
+    for (tile, rows) in values.iter().enumerate() {
+        finite_halves("tile_values", rows).map_err(|_| OpenError::NotFinite {
+            field: "tile_values",
+            index: tile,
+        })?;
     }
     Ok(())
 }
 
-fn entries(view: &BakedView<'_>, tier: &TierView<'_>) -> Result<(), OpenError> {
-    let (slots, values) = (tier.entry_slots(), tier.entry_values());
-    count("entry_slots", slots.len(), 0, limits::ENTRIES)?;
-    same_count("entry_values", values.len(), slots.len())?;
+fn fans(view: &BakedView<'_>, vertex_count: usize) -> Result<(), OpenError> {
+    let fans = view.fans();
+    count("fans", fans.len(), 0, limits::FANS)?;
     offsets(
-        "entry_offsets",
-        tier.entry_offsets(),
-        view.component_count(),
-        slots.len(),
+        "fan_offsets",
+        view.fan_offsets(),
+        vertex_count.div_ceil(FAN_VERTICES),
+        fans.len(),
     )?;
-    for (k, component) in view.components().enumerate() {
-        let support_count = tier.support_of(component.block as usize).len();
-        let start = tier.entry_offsets()[k] as usize;
-        ascending_below("entry_slots", start, tier.entries_of(k).0, support_count)?;
+    for (index, lanes) in fans.iter().enumerate() {
+        for &lane in lanes {
+            below("fans", index, lane, vertex_count)?;
+        }
     }
-    finite_halves("entry_values", values)
+    Ok(())
 }

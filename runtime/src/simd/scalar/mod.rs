@@ -1,10 +1,6 @@
-//! The scalar kernels, in the order of the frame: blend, gradient, poisson, surface; adjoint
-//! is the way back. Fixed summation order and every
+//! The scalar kernels, in the order of the frame: blend, gradient, poisson, surface. Fixed summation order and every
 //! transcendental function through `libm`, so one input gives the same bits on every machine.
 
-pub(crate) mod adjoint;
-pub(crate) mod blend;
-pub(crate) mod gradient;
 pub(crate) mod poisson;
 pub(crate) mod surface;
 

@@ -4,7 +4,7 @@
 //! symmetric c the normal equations are `sum_j c_ij (d_i - d_j) = 1/2 sum_j c_ij (D_i + D_j)(r_i - r_j)`. The factor
 //! holds `L` and the penalty that keeps the anchor vertex at zero.
 
-use super::blend::Features;
+use crate::simd::lanes::Gradient;
 
 /// Right-hand sides smaller than this are zero: products with them would be denormal, and denormals cost 22 times the
 /// time of a solve.
@@ -35,7 +35,7 @@ pub(crate) struct Factor<'a> {
 }
 
 /// `b_i = 1/2 sum_j c_ij (D_i + D_j)(r_i - r_j)`. Shape: all `[V]`, solver order.
-pub(crate) fn right_hand_side(rings: &Rings<'_>, rest: &[[f32; 3]], gradients: &[Features], b: &mut [[f32; 3]]) {
+pub(crate) fn right_hand_side(rings: &Rings<'_>, rest: &[[f32; 3]], gradients: &[Gradient], b: &mut [[f32; 3]]) {
     for (i, out) in b.iter_mut().enumerate() {
         let (r, d) = (&rest[i], &gradients[i]);
         let mut sum = [0.0_f32; 3];
@@ -44,10 +44,8 @@ pub(crate) fn right_hand_side(rings: &Rings<'_>, rest: &[[f32; 3]], gradients: &
             let (rj, dj) = (&rest[j as usize], &gradients[j as usize]);
             let edge = [r[0] - rj[0], r[1] - rj[1], r[2] - rj[2]];
             for c in 0..3 {
-                let row = 3 * c;
-                let turned = (d[row] + dj[row]) * edge[0]
-                    + (d[row + 1] + dj[row + 1]) * edge[1]
-                    + (d[row + 2] + dj[row + 2]) * edge[2];
+                let turned =
+                    (d[0][c] + dj[0][c]) * edge[0] + (d[1][c] + dj[1][c]) * edge[1] + (d[2][c] + dj[2][c]) * edge[2];
                 sum[c] += 0.5 * weight * turned;
             }
         }
@@ -96,11 +94,16 @@ mod tests {
     /// f32 substitution on a factor of condition about 1e2.
     const SOLVE_TOLERANCE: f64 = 2e-5;
 
+    /// Rows of nine to columns.
+    fn columns(d: &[f32; 9]) -> Gradient {
+        core::array::from_fn(|c| [d[c], d[3 + c], d[6 + c], 0.0])
+    }
+
     #[test]
     fn right_hand_side_equals_the_naive_sum() {
         let grid = Grid::new(4, 3);
         let mut noise = Noise::new(6);
-        let d: Vec<Features> = (0..grid.vertex_count()).map(|_| noise.features()).collect();
+        let d: Vec<Gradient> = (0..grid.vertex_count()).map(|_| columns(&noise.features())).collect();
         let mut b = std::vec![[9.0; 3]; grid.vertex_count()];
         right_hand_side(&grid.rings(), &grid.rest, &d, &mut b);
 
@@ -108,7 +111,7 @@ mod tests {
         for (i, j, weight) in grid.edges_both_ways() {
             for row in 0..3 {
                 for c in 0..3 {
-                    let mean = 0.5 * (f64::from(d[i][3 * row + c]) + f64::from(d[j][3 * row + c]));
+                    let mean = 0.5 * (f64::from(d[i][c][row]) + f64::from(d[j][c][row]));
                     let edge = f64::from(grid.rest[i][c]) - f64::from(grid.rest[j][c]);
                     expected[i][row] += f64::from(weight) * mean * edge;
                 }
@@ -121,7 +124,7 @@ mod tests {
     fn tiny_right_hand_sides_are_flushed() {
         let grid = Grid::new(2, 2);
         let mut b = std::vec![[9.0; 3]; 4];
-        right_hand_side(&grid.rings(), &grid.rest, &[[1e-30; 9]; 4], &mut b);
+        right_hand_side(&grid.rings(), &grid.rest, &[[[1e-30; 4]; 3]; 4], &mut b);
         assert_eq!(b, [[0.0; 3]; 4]);
     }
 
@@ -146,7 +149,12 @@ mod tests {
         let factor = factorise(&grid.laplacian());
         let d = [0.1, -0.2, 0.0, 0.3, 0.05, 0.1, 0.0, 0.2, -0.1];
         let mut b = std::vec![[0.0; 3]; grid.vertex_count()];
-        right_hand_side(&grid.rings(), &grid.rest, &std::vec![d; grid.vertex_count()], &mut b);
+        right_hand_side(
+            &grid.rings(),
+            &grid.rest,
+            &std::vec![columns(&d); grid.vertex_count()],
+            &mut b,
+        );
         substitute(&factor.view(), &mut b);
         let anchor = grid.rest[grid.anchor];
         let expected: Vec<[f64; 3]> = grid

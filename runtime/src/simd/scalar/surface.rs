@@ -1,62 +1,131 @@
-//! Displacements to what a renderer wants: positions in source order, and vertex normals.
+//! Displacements to what a renderer wants: positions in source order, their bounding box, and vertex normals.
 
 use libm::sqrtf;
-
-use super::gradient::cross;
+use sinew_formats::package::FAN_VERTICES;
 
 /// Normal of a vertex without area around it: unused, or all its triangles are degenerate.
 pub const FALLBACK_NORMAL: [f32; 3] = [0.0, 0.0, 1.0];
 
-/// `positions[vertex_from_solver[s]] = rest[s] + displacement[s]`. Shape: all `[V]`; `positions` in source order.
+/// The smallest box with edges along the axes that holds all positions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    /// Least x, y and z.
+    pub minimum: [f32; 3],
+    /// Greatest x, y and z.
+    pub maximum: [f32; 3],
+}
+
+impl Bounds {
+    /// Holds nothing.
+    pub(crate) const EMPTY: Self = Self {
+        minimum: [f32::INFINITY; 3],
+        maximum: [f32::NEG_INFINITY; 3],
+    };
+
+    /// Grows around a point of numbers.
+    pub(crate) fn include(&mut self, p: &[f32; 3]) {
+        for c in 0..3 {
+            self.minimum[c] = if p[c] < self.minimum[c] { p[c] } else { self.minimum[c] };
+            self.maximum[c] = if p[c] > self.maximum[c] { p[c] } else { self.maximum[c] };
+        }
+    }
+}
+
+/// Where the solver's nodes go. Shape: `[V]` each, permutations.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Places<'a> {
+    pub(crate) vertex_from_solver: &'a [u32],
+    pub(crate) lane_from_solver: &'a [u32],
+}
+
+/// `rest + displacement`, to `positions` in source order and to `posed` in lanes, filled up with a zero. Shape: all `[V]`.
 ///
-/// Errors: the first vertex, in solver order, whose position is not finite; then `positions` is only partly written.
+/// Errors: the first vertex, in solver order, whose position is not finite; then the output is only partly written.
 pub(crate) fn scatter(
     rest: &[[f32; 3]],
     displacement: &[[f32; 3]],
-    vertex_from_solver: &[u32],
+    places: Places<'_>,
+    posed: &mut [[f32; 4]],
     positions: &mut [[f32; 3]],
-) -> Result<(), u32> {
-    for ((r, d), &v) in rest.iter().zip(displacement).zip(vertex_from_solver) {
+) -> Result<Bounds, u32> {
+    let mut bounds = Bounds::EMPTY;
+    let mut finite = true;
+    let nodes = rest.iter().zip(displacement);
+    let targets = places.vertex_from_solver.iter().zip(places.lane_from_solver);
+    for ((r, d), (&v, &lane)) in nodes.clone().zip(targets) {
         let p = [r[0] + d[0], r[1] + d[1], r[2] + d[2]];
-        if !p.iter().all(|x| x.is_finite()) {
-            return Err(v);
-        }
+        finite &= p[0].abs().max(p[1].abs()).max(p[2].abs()) <= f32::MAX && !(p[0] + p[1] + p[2]).is_nan();
+        bounds.include(&p);
         positions[v as usize] = p;
+        posed[lane as usize] = [p[0], p[1], p[2], 0.0];
     }
-    Ok(())
+    if finite {
+        return Ok(bounds);
+    }
+    let lost = nodes
+        .zip(places.vertex_from_solver)
+        .find(|((r, d), _)| (0..3).any(|c| !(r[c] + d[c]).is_finite()));
+    Err(lost.map_or(0, |(_, &v)| v))
 }
 
-/// Unit vertex normals, the sum of the triangles' normals times their area. Shape: `faces` `[F]`, the rest `[V]`.
+/// How the triangles lie around the vertices, see [`sinew_formats::package::BakedBasis`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Around<'a> {
+    /// Shape: `[ceil(V / FAN_VERTICES) + 1]`.
+    pub(crate) offsets: &'a [u32],
+    /// Lanes.
+    pub(crate) fans: &'a [[u32; FAN_VERTICES]],
+    /// Shape: `[V]`.
+    pub(crate) solver_from_lane: &'a [u32],
+    /// Shape: `[V]`.
+    pub(crate) vertex_from_solver: &'a [u32],
+}
+
+/// Unit vertex normals, the sum of the triangles' normals times their area. Shape: `posed` `[V]` in lanes, `normals` `[V]` in
+/// source order.
 ///
 /// A vertex without area gets [`FALLBACK_NORMAL`].
-pub(crate) fn normals(faces: &[[u32; 3]], positions: &[[f32; 3]], normals: &mut [[f32; 3]]) {
-    normals.fill([0.0; 3]);
-    for face in faces {
-        let [p, q, r] = face.map(|v| positions[v as usize]);
-        let n = cross(
-            &[q[0] - p[0], q[1] - p[1], q[2] - p[2]],
-            &[r[0] - p[0], r[1] - p[1], r[2] - p[2]],
-        );
-        for &v in face {
-            let sum = &mut normals[v as usize];
-            for c in 0..3 {
-                sum[c] += n[c];
-            }
+pub(crate) fn normals(around: &Around<'_>, posed: &[[f32; 4]], normals: &mut [[f32; 3]]) {
+    for (lane, &solver) in around.solver_from_lane.iter().enumerate() {
+        let (quad, column) = (lane / FAN_VERTICES, lane % FAN_VERTICES);
+        let fan = &around.fans[around.offsets[quad] as usize..around.offsets[quad + 1] as usize];
+        let v = around.vertex_from_solver[solver as usize];
+        normals[v as usize] = unit(&area(posed, lane, fan.iter().map(|step| step[column])));
+    }
+}
+
+/// Twice the area vectors of the triangles of one walk.
+fn area(posed: &[[f32; 4]], centre: usize, mut walk: impl Iterator<Item = u32>) -> [f32; 3] {
+    let p = posed[centre];
+    let edge = |lane: u32| {
+        let q = posed[lane as usize];
+        [q[0] - p[0], q[1] - p[1], q[2] - p[2]]
+    };
+    let mut sum = [0.0; 3];
+    let Some(first) = walk.next() else {
+        return sum;
+    };
+    let mut a = edge(first);
+    for lane in walk {
+        let b = edge(lane);
+        for c in 0..3 {
+            let (i, j) = ((c + 1) % 3, (c + 2) % 3);
+            // No fused product: two equal edges must give zero.
+            sum[c] += a[i] * b[j] - a[j] * b[i];
         }
+        a = b;
     }
-    for n in normals {
-        *n = unit(n);
-    }
+    sum
 }
 
 fn unit(n: &[f32; 3]) -> [f32; 3] {
-    // Divide by the largest entry first: the square of a small or a large area would leave f32.
-    let largest = n[0].abs().max(n[1].abs()).max(n[2].abs());
-    let m = n.map(|x| x / largest);
-    let length = sqrtf(m[0] * m[0] + m[1] * m[1] + m[2] * m[2]);
-    // Zero or overflowed area: the quotient above is not a number.
-    if length.is_finite() && length > 0.0 {
-        m.map(|x| x / length)
+    // By the largest entry first: the square of a small or a large area would leave f32.
+    let inverse = 1.0 / n[0].abs().max(n[1].abs()).max(n[2].abs());
+    let m = n.map(|x| x * inverse);
+    let inverse = 1.0 / sqrtf(m[0] * m[0] + m[1] * m[1] + m[2] * m[2]);
+    // Zero or overflowed area: the quotient above is not a number, or nothing is left.
+    if inverse > 0.0 && inverse < 2.0 {
+        m.map(|x| x * inverse)
     } else {
         FALLBACK_NORMAL
     }
@@ -64,28 +133,72 @@ fn unit(n: &[f32; 3]) -> [f32; 3] {
 
 #[cfg(test)]
 mod tests {
+    use std::vec;
+    use std::vec::Vec;
+
+    use sinew_formats::package::Fans;
+
     use super::*;
 
     /// Rounding of a unit vector.
     const TOLERANCE: f32 = 1e-6;
 
+    fn identity(count: usize) -> Vec<u32> {
+        (0..count as u32).collect()
+    }
+
+    /// Normals with all orders the same.
+    fn normals_of(faces: &[[u32; 3]], positions: &[[f32; 3]]) -> Vec<[f32; 3]> {
+        let lanes = identity(positions.len());
+        let Fans { fan_offsets, fans } = Fans::gather(faces, &lanes);
+        let around = Around {
+            offsets: &fan_offsets,
+            fans: &fans,
+            solver_from_lane: &lanes,
+            vertex_from_solver: &lanes,
+        };
+        let posed: Vec<[f32; 4]> = positions.iter().map(|p| [p[0], p[1], p[2], 0.0]).collect();
+        let mut found = vec![[f32::NAN; 3]; positions.len()];
+        normals(&around, &posed, &mut found);
+        found
+    }
+
+    fn scattered(displacement: &[[f32; 3]], order: &[u32]) -> (Result<Bounds, u32>, Vec<[f32; 3]>, Vec<[f32; 4]>) {
+        let count = displacement.len();
+        let rest: Vec<[f32; 3]> = (0..count).map(|s| [s as f32 + 1.0, 0.0, 0.0]).collect();
+        let lanes: Vec<u32> = (0..count as u32).rev().collect();
+        let places = Places {
+            vertex_from_solver: order,
+            lane_from_solver: &lanes,
+        };
+        let (mut positions, mut posed) = (vec![[0.0; 3]; count], vec![[9.0; 4]; count]);
+        let outcome = scatter(&rest, displacement, places, &mut posed, &mut positions);
+        (outcome, positions, posed)
+    }
+
     #[test]
-    fn scatter_follows_the_permutation() {
-        let rest = [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0]];
-        let displacement = [[0.0, 0.5, 0.0]; 3];
-        let mut positions = [[0.0; 3]; 3];
-        assert_eq!(scatter(&rest, &displacement, &[2, 0, 1], &mut positions), Ok(()));
+    fn scatter_follows_both_permutations_and_bounds_the_positions() {
+        let (bounds, positions, posed) = scattered(&[[0.0, 0.5, 0.0]; 3], &[2, 0, 1]);
         assert_eq!(positions, [[2.0, 0.5, 0.0], [3.0, 0.5, 0.0], [1.0, 0.5, 0.0]]);
+        assert_eq!(
+            posed,
+            [[3.0, 0.5, 0.0, 0.0], [2.0, 0.5, 0.0, 0.0], [1.0, 0.5, 0.0, 0.0]]
+        );
+        let expected = Bounds {
+            minimum: [1.0, 0.5, 0.0],
+            maximum: [3.0, 0.5, 0.0],
+        };
+        assert_eq!(bounds, Ok(expected));
     }
 
     #[test]
     fn scatter_names_the_vertex_that_is_not_finite() {
-        for bad in [f32::NAN, f32::INFINITY] {
-            let displacement = [[0.0; 3], [0.0, bad, 0.0]];
-            assert_eq!(
-                scatter(&[[0.0; 3]; 2], &displacement, &[1, 0], &mut [[0.0; 3]; 2]),
-                Err(0)
-            );
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            for c in 0..3 {
+                let mut displacement = [[0.0; 3]; 4];
+                displacement[1][c] = bad;
+                assert_eq!(scattered(&displacement, &[1, 0, 3, 2]).0, Err(0));
+            }
         }
     }
 
@@ -93,8 +206,7 @@ mod tests {
     fn normals_are_weighted_by_area() {
         // Two triangles over the edge 0-1: one of area 1 facing +z, one of area 2 facing +y.
         let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 4.0]];
-        let mut found = [[0.0; 3]; 4];
-        normals(&[[0, 1, 2], [1, 0, 3]], &positions, &mut found);
+        let found = normals_of(&[[0, 1, 2], [1, 0, 3]], &positions);
         let slant = 1.0 / 5.0_f32.sqrt();
         let expected = [
             [0.0, 2.0 * slant, slant],
@@ -109,19 +221,17 @@ mod tests {
 
     #[test]
     fn vertices_without_area_get_the_fallback() {
-        let mut found = [[0.0; 3]; 4];
-        let line = [[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [5.0, 5.0, 5.0]];
-        normals(&[[0, 1, 2]], &line, &mut found);
-        assert_eq!(found, [FALLBACK_NORMAL; 4]);
+        let line = [[0.1, 0.7, 0.3], [1.1, 0.7, 0.3], [2.1, 0.7, 0.3], [5.0, 5.0, 5.0]];
+        assert_eq!(normals_of(&[[0, 1, 2]], &line), [FALLBACK_NORMAL; 4]);
+        let double = [[0.1, 0.2, 0.3], [1.3, 0.7, 0.9], [1.3, 0.7, 0.9]];
+        assert_eq!(normals_of(&[[0, 1, 2]], &double), [FALLBACK_NORMAL; 3]);
     }
 
     #[test]
     fn tiny_and_huge_triangles_have_unit_normals() {
         for scale in [1e-15_f32, 1e9, 1e17] {
             let positions = [[0.0; 3], [scale, 0.0, 0.0], [0.0, scale, scale]];
-            let mut found = [[0.0; 3]; 3];
-            normals(&[[0, 1, 2]], &positions, &mut found);
-            for n in found {
+            for n in normals_of(&[[0, 1, 2]], &positions) {
                 assert!(
                     (n[0] * n[0] + n[1] * n[1] + n[2] * n[2] - 1.0).abs() < TOLERANCE,
                     "{scale}: {n:?}"
@@ -129,12 +239,7 @@ mod tests {
                 assert_ne!(n, FALLBACK_NORMAL);
             }
         }
-        let mut found = [[0.0; 3]; 3];
-        normals(
-            &[[0, 1, 2]],
-            &[[0.0; 3], [1e30, 0.0, 0.0], [0.0, 1e30, 1e30]],
-            &mut found,
-        );
-        assert_eq!(found, [FALLBACK_NORMAL; 3]);
+        let overflowing = [[0.0; 3], [1e30, 0.0, 0.0], [0.0, 1e30, 1e30]];
+        assert_eq!(normals_of(&[[0, 1, 2]], &overflowing), [FALLBACK_NORMAL; 3]);
     }
 }

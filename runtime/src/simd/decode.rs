@@ -1,0 +1,362 @@
+//! Decode, a group of vertices at a time and all in registers: the sparse blend of the blocks' folded components, tanh,
+//! the sum of the blocks, and the exponential map to deformation gradients (method sections 1 and 2).
+//!
+//! Written once for any [`Lanes`]. The decoder's convolution is folded into the components by the baker, because blend
+//! and convolution are both linear: only `tanh(bias + sum_k z_k C_k)` is left for the frame. Gradients are kept as
+//! `D = T - I`: rest gives exactly zero, and the solve then works on displacements, which keeps f32 accurate.
+
+use sinew_formats::package::{FEATURE_COUNT, GROUP_NODES};
+
+pub(crate) use super::adjoint::{derivatives, held};
+use super::functions::{half_angle, tanh};
+use super::lanes::{Gradient, Lanes};
+
+/// Nine numbers of each vertex of a group, number first.
+pub(crate) type Group<T> = [[T; GROUP_NODES]; FEATURE_COUNT];
+/// Nine vectors.
+pub(super) type Row<L> = [L; FEATURE_COUNT];
+/// Row-major 3x3 of vectors.
+pub(super) type Matrix<L> = [[L; 3]; 3];
+
+/// The components, by groups of vertices: G groups, T tiles.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tiles<'a> {
+    /// Shape: `[G + 1]`.
+    pub(crate) offsets: &'a [u32],
+    /// Component and block of each tile, ascending within a group. Shape: `[T]`.
+    pub(crate) owners: &'a [[u16; 2]],
+    /// IEEE half bits. Shape: `[T]`.
+    pub(crate) values: &'a [Group<u16>],
+}
+
+/// What a component counts in this frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct Share {
+    /// Weight times the scale of the component's values; finite times any half.
+    pub(crate) factor: f32,
+    /// Not zero where it was another one in the frame before.
+    pub(crate) changed: u32,
+}
+
+/// What a block adds at rest.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub(crate) struct BlockRest {
+    /// Of the decoder.
+    pub(crate) bias: [f32; FEATURE_COUNT],
+    /// Its tanh, from the kernel that computes the others: an untouched vertex then gives exactly zero.
+    pub(crate) activation: [f32; FEATURE_COUNT],
+}
+
+/// What a network feature means: the two scales of the package.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FeatureScales {
+    /// Network value to radians.
+    pub(crate) rotation: f32,
+    /// Network value to stretch.
+    pub(crate) stretch: f32,
+}
+
+/// Everything that decode reads.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Decoder<'a> {
+    pub(crate) tiles: Tiles<'a>,
+    /// Shape: `[K]`.
+    pub(crate) shares: &'a [Share],
+    /// Shape: `[B]`.
+    pub(crate) blocks: &'a [BlockRest],
+    pub(crate) scales: FeatureScales,
+    /// Where the gradient of each lane goes. Shape: `[N]`; `G = ceil(N / GROUP_NODES)`.
+    pub(crate) places: &'a [u32],
+    /// Also decodes what no changed component touches.
+    pub(crate) all: bool,
+}
+
+/// Fills in the activations of the biases.
+#[inline(always)]
+pub(crate) fn rest_activations<L: Lanes>(blocks: &mut [BlockRest]) {
+    for block in blocks {
+        for c in 0..FEATURE_COUNT {
+            let mut lanes = [0.0; GROUP_NODES];
+            tanh(L::splat(block.bias[c])).store(&mut lanes);
+            block.activation[c] = lanes[0];
+        }
+    }
+}
+
+/// Features and gradients of the groups that a changed component touches; the others stay.
+///
+/// Shape: `features` `[G]`, `gradients` `[N]`, solver order.
+#[inline(always)]
+pub(crate) fn decode<L: Lanes>(decoder: &Decoder<'_>, features: &mut [Group<f32>], gradients: &mut [Gradient]) {
+    for (g, (features, places)) in features.iter_mut().zip(decoder.places.chunks(GROUP_NODES)).enumerate() {
+        let tiles = decoder.tiles.of(g);
+        let changed = |owner: &[u16; 2]| decoder.shares[owner[0] as usize].changed != 0;
+        if !decoder.all && !decoder.tiles.owners[tiles.clone()].iter().any(changed) {
+            continue;
+        }
+        for lane in (0..places.len()).step_by(L::COUNT) {
+            let x = blend::<L>(decoder, tiles.clone(), lane);
+            for c in 0..FEATURE_COUNT {
+                x[c].store(&mut features[c][lane..]);
+            }
+            scatter(&gradient(decoder.scales, &x), part::<L>(places, lane), gradients);
+        }
+    }
+}
+
+/// Gradients of one group of features, to `places`.
+#[inline(always)]
+pub(crate) fn gradients<L: Lanes>(
+    scales: FeatureScales,
+    features: &Group<f32>,
+    places: &[u32],
+    gradients: &mut [Gradient],
+) {
+    for lane in (0..places.len()).step_by(L::COUNT) {
+        let x = features.each_ref().map(|row| L::load(&row[lane..]));
+        scatter(&gradient(scales, &x), part::<L>(places, lane), gradients);
+    }
+}
+
+/// Derivatives of all gradients along component `k`, at the pose whose features these are.
+///
+/// `dx = (1 - tanh^2(bias + u)) C_k` where the component reaches, `dT = [J_l(r) dr]x R S + R dS`.
+#[inline(always)]
+pub(crate) fn tangents<L: Lanes>(
+    decoder: &Decoder<'_>,
+    k: usize,
+    scale: f32,
+    features: &[Group<f32>],
+    gradients: &mut [Gradient],
+) {
+    for (g, (features, places)) in features.iter().zip(decoder.places.chunks(GROUP_NODES)).enumerate() {
+        let tiles = decoder.tiles.of(g);
+        let owners = &decoder.tiles.owners[tiles.clone()];
+        let Some(own) = owners.iter().position(|owner| owner[0] as usize == k) else {
+            for &place in places {
+                gradients[place as usize] = [[0.0; 4]; 3];
+            }
+            continue;
+        };
+        let b = owners[own][1];
+        let block = owners.iter().position(|owner| owner[1] == b).unwrap_or(own);
+        let values = &decoder.tiles.values[tiles.start + own];
+        for lane in (0..places.len()).step_by(L::COUNT) {
+            let (u, _) = block_blend::<L>(decoder, tiles.start + block..tiles.end, lane);
+            let dx: Row<L> = core::array::from_fn(|c| {
+                let y = tanh(u[c]);
+                let slope = y.neg_mul_add(y, L::splat(1.0)).mul(L::splat(scale));
+                slope.mul(L::load_halves(&values[c][lane..]))
+            });
+            let x = features.each_ref().map(|row| L::load(&row[lane..]));
+            scatter(
+                &gradient_tangent(decoder.scales, &x, &dx),
+                part::<L>(places, lane),
+                gradients,
+            );
+        }
+    }
+}
+
+/// The places of the lanes from `lane` on.
+#[inline(always)]
+fn part<L: Lanes>(places: &[u32], lane: usize) -> &[u32] {
+    &places[lane..places.len().min(lane + L::COUNT)]
+}
+
+impl Tiles<'_> {
+    /// The tiles of a group.
+    #[inline(always)]
+    pub(super) fn of(&self, g: usize) -> core::ops::Range<usize> {
+        self.offsets[g] as usize..self.offsets[g + 1] as usize
+    }
+}
+
+/// Features: the sum over the blocks of `tanh(bias + sum_k z_k C_k) - tanh(bias)`, from one lane on.
+#[inline(always)]
+pub(super) fn blend<L: Lanes>(decoder: &Decoder<'_>, tiles: core::ops::Range<usize>, lane: usize) -> Row<L> {
+    let mut x = [L::splat(0.0); FEATURE_COUNT];
+    let mut t = tiles.start;
+    while t < tiles.end {
+        let b = decoder.tiles.owners[t][1];
+        let (u, end) = block_blend::<L>(decoder, t..tiles.end, lane);
+        // A block at rest adds nothing.
+        if decoder.tiles.owners[t..end]
+            .iter()
+            .any(|owner| decoder.shares[owner[0] as usize].factor != 0.0)
+        {
+            let rest = &decoder.blocks[b as usize].activation;
+            for c in 0..FEATURE_COUNT {
+                x[c] = x[c].add(tanh(u[c]).sub(L::splat(rest[c])));
+            }
+        }
+        t = end;
+    }
+    x
+}
+
+/// `bias + sum_k z_k C_k` of the block that the first tile belongs to, and where its tiles end.
+#[inline(always)]
+pub(super) fn block_blend<L: Lanes>(
+    decoder: &Decoder<'_>,
+    tiles: core::ops::Range<usize>,
+    lane: usize,
+) -> (Row<L>, usize) {
+    let owners = &decoder.tiles.owners[tiles.clone()];
+    let values = &decoder.tiles.values[tiles.clone()];
+    let b = owners[0][1];
+    let mut u = decoder.blocks[b as usize].bias.map(L::splat);
+    let mut count = 0;
+    for (owner, values) in owners.iter().zip(values) {
+        if owner[1] != b {
+            break;
+        }
+        let factor = decoder.shares[owner[0] as usize].factor;
+        if factor != 0.0 {
+            let factor = L::splat(factor);
+            for c in 0..FEATURE_COUNT {
+                u[c] = L::load_halves(&values[c][lane..]).mul_add(factor, u[c]);
+            }
+        }
+        count += 1;
+    }
+    (u, tiles.start + count)
+}
+
+/// `D = exp([r]x) S - I` by rows.
+#[inline(always)]
+pub(super) fn gradient<L: Lanes>(scales: FeatureScales, x: &Row<L>) -> Row<L> {
+    let e = rotation_less_identity(&log_rotation(scales, x)).0;
+    let p = stretch_less_identity(scales, x);
+    // (I + E)(I + P) - I = E + P + E P: no difference of near-equal numbers.
+    core::array::from_fn(|n| {
+        let (i, j) = (n / 3, n % 3);
+        e[i][j].add(p[i][j]).add(product(&e, &p, i, j))
+    })
+}
+
+/// Derivative of the gradient when the features move along `dx`, by rows.
+#[inline(always)]
+fn gradient_tangent<L: Lanes>(scales: FeatureScales, x: &Row<L>, dx: &Row<L>) -> Row<L> {
+    let r = log_rotation(scales, x);
+    let (e, turn) = rotation_less_identity(&r);
+    let w = left_jacobian(&r, &log_rotation(scales, dx), &turn);
+    let (rotation, stretch) = (plus_identity(e), plus_identity(stretch_less_identity(scales, x)));
+    let deformation: Matrix<L> = core::array::from_fn(|i| core::array::from_fn(|j| product(&rotation, &stretch, i, j)));
+    let stretched = stretch_less_identity(scales, dx);
+    let turned = |i: usize, j: usize| {
+        let (a, b) = ((i + 1) % 3, (i + 2) % 3);
+        w[a].mul(deformation[b][j]).sub(w[b].mul(deformation[a][j]))
+    };
+    core::array::from_fn(|n| turned(n / 3, n % 3).add(product(&rotation, &stretched, n / 3, n % 3)))
+}
+
+/// `J_l(r) dr`: the angular velocity, in the deformed frame, of `exp([r + t dr]x)`.
+///
+/// `J_l = a I + b [r]x + c r r^T` with `a = sin t / t`, `b = (1 - cos t) / t^2` and `c = (t - sin t) / t^3`.
+#[inline(always)]
+fn left_jacobian<L: Lanes>(r: &[L; 3], dr: &[L; 3], turn: &HalfTurn<L>) -> [L; 3] {
+    let [a, b, c] = turn.jacobian();
+    let along = c.mul(dot(r, dr));
+    core::array::from_fn(|i| {
+        let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+        let across = r[j].mul(dr[k]).sub(r[k].mul(dr[j]));
+        along.mul_add(r[i], b.mul_add(across, a.mul(dr[i])))
+    })
+}
+
+impl<L: Lanes> HalfTurn<L> {
+    /// a, b and c of [`left_jacobian`].
+    #[inline(always)]
+    pub(super) fn jacobian(&self) -> [L; 3] {
+        /// Below this squared angle a series: the closed form cancels.
+        const SERIES_ANGLE_SQUARED: f32 = 1.0;
+        let twice = self.sine.add(self.sine);
+        let (a, b) = (twice.mul(self.cosine), twice.mul(self.sine));
+        let t = self.angle_squared;
+        let series = [1.0 / 362_880.0, -1.0 / 5040.0, 1.0 / 120.0, -1.0 / 6.0];
+        let series = series
+            .into_iter()
+            .fold(L::splat(0.0), |sum, term| sum.mul_add(t, L::splat(term)));
+        let closed = L::splat(1.0).sub(a).div(t);
+        let c = t.select_below(L::splat(SERIES_ANGLE_SQUARED), L::splat(0.0).sub(series), closed);
+        [a, b, c]
+    }
+}
+
+/// One entry of `A B`.
+#[inline(always)]
+pub(super) fn product<L: Lanes>(a: &Matrix<L>, b: &Matrix<L>, i: usize, j: usize) -> L {
+    a[i][2].mul_add(b[2][j], a[i][1].mul_add(b[1][j], a[i][0].mul(b[0][j])))
+}
+
+#[inline(always)]
+pub(super) fn plus_identity<L: Lanes>(mut a: Matrix<L>) -> Matrix<L> {
+    for i in 0..3 {
+        a[i][i] = a[i][i].add(L::splat(1.0));
+    }
+    a
+}
+
+#[inline(always)]
+pub(super) fn log_rotation<L: Lanes>(scales: FeatureScales, x: &Row<L>) -> [L; 3] {
+    core::array::from_fn(|c| L::splat(scales.rotation).mul(x[c]))
+}
+
+/// `S - I`.
+#[inline(always)]
+pub(super) fn stretch_less_identity<L: Lanes>(scales: FeatureScales, x: &Row<L>) -> Matrix<L> {
+    let s: [L; 6] = core::array::from_fn(|c| L::splat(scales.stretch).mul(x[3 + c]));
+    [[s[0], s[1], s[2]], [s[1], s[3], s[4]], [s[2], s[4], s[5]]]
+}
+
+/// What Rodrigues' formula knows besides the matrix.
+pub(super) struct HalfTurn<L> {
+    /// `|r|^2`.
+    angle_squared: L,
+    /// `sin(|r| / 2) / |r|`, up to the sign that it shares with `cosine`.
+    sine: L,
+    /// `cos(|r| / 2)`.
+    cosine: L,
+}
+
+/// `exp([r]x) - I = 2 w [v]x + 2 [v]x^2` with the quaternion `(w, v)` of the rotation: squares and products only.
+#[inline(always)]
+pub(super) fn rotation_less_identity<L: Lanes>(r: &[L; 3]) -> (Matrix<L>, HalfTurn<L>) {
+    let angle_squared = dot(r, r);
+    let [sine, cosine] = half_angle(angle_squared.sqrt());
+    let v = r.map(|x| x.mul(sine));
+    let twice = v.map(|x| x.add(x));
+    let w = twice.map(|x| x.mul(cosine));
+    let square = [v[0].mul(twice[0]), v[1].mul(twice[1]), v[2].mul(twice[2])];
+    let [xy, xz, yz] = [v[0].mul(twice[1]), v[0].mul(twice[2]), v[1].mul(twice[2])];
+    let zero = L::splat(0.0);
+    let diagonal = |i: usize, j: usize| zero.sub(square[i]).sub(square[j]);
+    let matrix = [
+        [diagonal(1, 2), xy.sub(w[2]), xz.add(w[1])],
+        [xy.add(w[2]), diagonal(0, 2), yz.sub(w[0])],
+        [xz.sub(w[1]), yz.add(w[0]), diagonal(0, 1)],
+    ];
+    let turn = HalfTurn {
+        angle_squared,
+        sine,
+        cosine,
+    };
+    (matrix, turn)
+}
+
+#[inline(always)]
+pub(super) fn dot<L: Lanes>(a: &[L; 3], b: &[L; 3]) -> L {
+    a[2].mul_add(b[2], a[1].mul_add(b[1], a[0].mul(b[0])))
+}
+
+/// Gradients to their places, by columns.
+#[inline(always)]
+fn scatter<L: Lanes>(d: &Row<L>, places: &[u32], gradients: &mut [Gradient]) {
+    for column in 0..3 {
+        let rows = [d[column], d[3 + column], d[6 + column], L::splat(0.0)];
+        L::scatter(rows, places, column, gradients);
+    }
+}
