@@ -4,7 +4,7 @@ use core::fmt;
 
 use sinew_formats::package::{BakedBlock, BakedView, NONE, OpenError, RenderMesh, TierView};
 
-use crate::simd::decode::{FeatureScales, Tiles};
+use crate::simd::decode::{FeatureScales, Patches};
 use crate::simd::scalar::poisson::{Factor, Rings};
 use crate::simd::scalar::surface::{Around, Places};
 
@@ -231,11 +231,11 @@ impl<'a> Tier<'a> {
     }
 
     /// The components.
-    pub(crate) fn tiles(&self) -> Tiles<'a> {
-        Tiles {
-            offsets: self.nodes.tile_offsets(),
-            owners: self.nodes.tile_owners(),
-            values: self.nodes.tile_values(),
+    pub(crate) fn patches(&self) -> Patches<'a> {
+        Patches {
+            offsets: self.nodes.patch_offsets(),
+            owners: self.nodes.patch_owners(),
+            values: self.nodes.patch_values(),
         }
     }
 

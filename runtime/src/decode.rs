@@ -2,7 +2,7 @@
 
 use crate::basis::Tier;
 use crate::simd::Kernels;
-use crate::simd::decode::{BlockRest, Decoder, Group, Share};
+use crate::simd::decode::{BlockRest, Decoder, Share};
 use crate::simd::lanes::Gradient;
 
 /// Weights nearer to zero are zero: their products would be denormal and slow, and nobody sees them.
@@ -27,14 +27,12 @@ pub(crate) struct Decoded<'p> {
     pub(crate) shares: &'p mut [Share],
     /// Shape: `[B]`.
     pub(crate) blocks: &'p [BlockRest],
-    /// Shape: `[G]`.
-    pub(crate) features: &'p mut [Group<f32>],
     /// Shape: `[N]`, solver order.
     pub(crate) gradients: &'p mut [Gradient],
 }
 
 impl Decoded<'_> {
-    /// Brings features and gradients to `weights` `[K]`, flushed. `all` where the gradients are not those of the pose before.
+    /// Brings the gradients to `weights` `[K]`, flushed. `all` where the gradients are not those of the pose before.
     pub(crate) fn update(self, tier: &Tier<'_>, kernels: Kernels, weights: &[f32], all: bool) {
         for (k, (share, &weight)) in self.shares.iter_mut().zip(weights).enumerate() {
             let factor = factor(tier, k, weight);
@@ -42,14 +40,14 @@ impl Decoded<'_> {
             *share = Share { factor, changed };
         }
         let decoder = decoder(tier, self.shares, self.blocks, all);
-        kernels.decode(&decoder, self.features, self.gradients);
+        kernels.decode(&decoder, self.gradients);
     }
 }
 
 /// What the kernels read.
 pub(crate) fn decoder<'a>(tier: &Tier<'a>, shares: &'a [Share], blocks: &'a [BlockRest], all: bool) -> Decoder<'a> {
     Decoder {
-        tiles: tier.tiles(),
+        patches: tier.patches(),
         shares,
         blocks,
         scales: tier.scales(),

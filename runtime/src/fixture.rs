@@ -7,7 +7,7 @@ use std::vec::Vec;
 
 use half::f16;
 use sinew_formats::package::{
-    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedTier, Fans, NONE, RenderMesh, Tiles, write_baked,
+    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedTier, Fans, NONE, Patches, RenderMesh, write_baked,
 };
 
 use crate::basis::Basis;
@@ -218,7 +218,7 @@ impl Package {
                 });
             }
         }
-        let tiles = Tiles::gather(grid.vertex_count(), entries);
+        let patches = Patches::gather(grid.vertex_count(), entries);
         let lane = |&s: &u32| lane_from_solver[s as usize];
         let fans = Fans::gather(
             &grid.faces,
@@ -247,9 +247,9 @@ impl Package {
                 inverse_pivots: &factor.inverse_pivots,
                 solver_from_lane: &solver_from_lane,
                 lane_from_solver: &lane_from_solver,
-                tile_offsets: &tiles.tile_offsets,
-                tile_owners: &tiles.tile_owners,
-                tile_values: &tiles.tile_values,
+                patch_offsets: &patches.patch_offsets,
+                patch_owners: &patches.patch_owners,
+                patch_values: &patches.patch_values,
             },
             fast: None,
             render: RenderMesh::NONE,

@@ -67,7 +67,6 @@ impl Frame<'_> {
             let decoded = Decoded {
                 shares: workspace.shares,
                 blocks: workspace.blocks,
-                features: workspace.features,
                 gradients: workspace.gradients,
             };
             decoded.update(

@@ -50,12 +50,10 @@ impl Tangent<'_> {
         self.validate(workspace)?;
         let tier = self.basis.exact();
         let decoder = decoder(&tier, workspace.shares, workspace.blocks, true);
-        let (features, gradients) = (&*workspace.features, &mut *workspace.gradients);
+        let gradients = &mut *workspace.gradients;
         workspace.gradients_are_stale = true;
         let scale = tier.value_scale(self.component);
-        workspace
-            .kernels
-            .tangents(&decoder, self.component, scale, features, gradients);
+        workspace.kernels.tangents(&decoder, self.component, scale, gradients);
         let solution = &mut *workspace.solution;
         solve(&tier, gradients, solution);
         for (d, &v) in solution.iter().zip(self.basis.vertex_from_solver()) {

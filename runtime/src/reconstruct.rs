@@ -92,7 +92,8 @@ mod tests {
         }
         .run(&mut workspace)
         .unwrap();
-        let features: vec::Vec<_> = workspace.features(&basis).collect();
+        let mut features = vec![[0.0; FEATURE_COUNT]; basis.vertex_count()];
+        workspace.features(&basis, &mut features).unwrap();
         let mut again = vec![[0.0; 3]; basis.vertex_count()];
         Reconstruct {
             basis: &basis,

@@ -5,9 +5,11 @@
 use sinew_formats::package::{FEATURE_COUNT, GROUP_NODES};
 
 use crate::basis::Basis;
-use crate::error::{FrameError, WorkspaceError};
+use crate::decode::decoder;
+use crate::error::{Buffer, FrameError, WorkspaceError};
+use crate::normals::check_length;
 use crate::simd::Kernels;
-use crate::simd::decode::{BlockRest, Group, Share};
+use crate::simd::decode::{BlockRest, Share};
 use crate::simd::lanes::Gradient;
 use crate::simd::scalar::surface::Bounds;
 
@@ -24,7 +26,7 @@ pub struct WorkspaceLayout {
 }
 
 impl WorkspaceLayout {
-    /// Layout for `basis`: about 124 bytes a vertex.
+    /// Layout for `basis`: about 88 bytes a vertex.
     pub fn for_basis(basis: &Basis<'_>) -> Self {
         let sections = Sections::of(basis);
         Self {
@@ -61,14 +63,9 @@ impl Sections {
         section_bytes::<f32>(self.components)
             + section_bytes::<Share>(self.components)
             + section_bytes::<BlockRest>(self.blocks)
-            + section_bytes::<Group<f32>>(self.groups())
             + section_bytes::<Gradient>(self.nodes)
             + 2 * section_bytes::<[f32; 3]>(self.nodes)
             + section_bytes::<[f32; 4]>(self.nodes)
-    }
-
-    fn groups(&self) -> usize {
-        self.nodes.div_ceil(GROUP_NODES)
     }
 }
 
@@ -90,8 +87,6 @@ pub struct Workspace<'w> {
     pub(crate) shares: &'w mut [Share],
     /// Constants of the basis and the kernels. Shape: `[B]`.
     pub(crate) blocks: &'w mut [BlockRest],
-    /// Features of the pose, network units. Shape: `[G]`, lanes.
-    pub(crate) features: &'w mut [Group<f32>],
     /// `D = T - I` of the pose, or scratch. Shape: `[V]`, solver order.
     pub(crate) gradients: &'w mut [Gradient],
     /// Whether another job has used the gradients since the last frame.
@@ -138,7 +133,6 @@ impl<'w> Workspace<'w> {
         let (weights, memory) = carve(memory, sections.components);
         let (shares, memory) = carve(memory, sections.components);
         let (blocks, memory) = carve::<BlockRest>(memory, sections.blocks);
-        let (features, memory) = carve(memory, sections.groups());
         let (gradients, memory) = carve(memory, sections.nodes);
         let (displacement, memory) = carve(memory, sections.nodes);
         let (solution, memory) = carve(memory, sections.nodes);
@@ -154,7 +148,6 @@ impl<'w> Workspace<'w> {
             weights,
             shares,
             blocks,
-            features,
             gradients,
             gradients_are_stale: false,
             displacement,
@@ -164,14 +157,25 @@ impl<'w> Workspace<'w> {
         })
     }
 
-    /// Features of the pose, in network units; zero where no component reaches. Shape: `[V]`, source order.
+    /// Computes the features of the pose again, in network units; zero where no component reaches. Shape: `[V]`, source
+    /// order.
     ///
-    /// `basis` is the one that this workspace was made for; with another the features are those of other vertices, or none.
-    pub fn features(&self, basis: &Basis<'_>) -> impl Iterator<Item = [f32; FEATURE_COUNT]> {
-        basis.lanes().filter_map(|lane| {
-            let group = self.features.get(lane / GROUP_NODES)?;
-            Some(group.map(|row| row[lane % GROUP_NODES]))
-        })
+    /// # Errors
+    /// [`FrameError::ForeignWorkspace`], [`FrameError::WrongLength`].
+    pub fn features(&self, basis: &Basis<'_>, features: &mut [[f32; FEATURE_COUNT]]) -> Result<(), FrameError> {
+        self.validate(basis)?;
+        check_length(basis, Buffer::Features, features.len())?;
+        let tier = basis.exact();
+        let decoder = decoder(&tier, self.shares, self.blocks, true);
+        let mut group = [[0.0; GROUP_NODES]; FEATURE_COUNT];
+        for (g, solvers) in tier.solver_from_lane().chunks(GROUP_NODES).enumerate() {
+            self.kernels.features(&decoder, g, &mut group);
+            for (n, &solver) in solvers.iter().enumerate() {
+                let v = basis.vertex_from_solver()[solver as usize];
+                features[v as usize] = group.map(|row| row[n]);
+            }
+        }
+        Ok(())
     }
 
     /// Bounding box of the positions that the last job wrote: holds nothing, infinite and turned over, before the first.
@@ -193,7 +197,6 @@ impl<'w> Workspace<'w> {
     pub(crate) fn rest(&mut self) {
         self.weights.fill(0.0);
         self.shares.fill(Share::default());
-        self.features.fill([[0.0; GROUP_NODES]; FEATURE_COUNT]);
         self.gradients.fill([[0.0; 4]; 3]);
         self.gradients_are_stale = false;
         self.displacement.fill([0.0; 3]);
@@ -232,8 +235,9 @@ mod tests {
         for start in 0..70 {
             let workspace = Workspace::new(&basis, &mut memory[start..start + layout.unaligned_bytes()]).unwrap();
             assert_eq!(workspace.weights.len(), basis.component_count());
-            assert_eq!(workspace.features(&basis).count(), basis.vertex_count());
-            assert!(workspace.features(&basis).all(|x| x == [0.0; FEATURE_COUNT]));
+            let mut features = vec![[1.0; FEATURE_COUNT]; basis.vertex_count()];
+            workspace.features(&basis, &mut features).unwrap();
+            assert_eq!(features, vec![[0.0; FEATURE_COUNT]; basis.vertex_count()]);
             assert_eq!(workspace.gradients.as_ptr().align_offset(ALIGNMENT), 0);
             assert_eq!(workspace.solution.as_ptr().align_offset(ALIGNMENT), 0);
         }
@@ -284,8 +288,7 @@ mod tests {
         let package = Package::small(1);
         let basis = open(&package);
         let layout = WorkspaceLayout::for_basis(&basis);
-        let lanes = basis.vertex_count().next_multiple_of(GROUP_NODES);
-        let exact = 12 * basis.component_count() + 72 * basis.block_count() + 36 * lanes + 88 * basis.vertex_count();
+        let exact = 12 * basis.component_count() + 72 * basis.block_count() + 88 * basis.vertex_count();
         assert!(
             layout.size_bytes <= exact + 8 * layout.alignment,
             "{} {exact}",

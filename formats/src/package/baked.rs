@@ -83,16 +83,16 @@ pub struct BakedTier<'a> {
     /// Shape: `[N]`, its inverse.
     #[rkyv(with = InlineAsBox)]
     pub lane_from_solver: &'a [u32],
-    /// Compressed rows over the tiles, one a group; G = ceil(N / GROUP_NODES). Shape: `[G + 1]`, starts at 0, never falls.
+    /// Compressed rows over the patches, one a group; G = ceil(N / GROUP_NODES). Shape: `[G + 1]`, starts at 0, never falls.
     #[rkyv(with = InlineAsBox)]
-    pub tile_offsets: &'a [u32],
-    /// Component of each tile, ascending within a group, and the block it belongs to. Shape: `[T]`.
+    pub patch_offsets: &'a [u32],
+    /// Component of each patch, ascending within a group, and the block it belongs to. Shape: `[T]`.
     #[rkyv(with = InlineAsBox)]
-    pub tile_owners: &'a [[u16; 2]],
+    pub patch_owners: &'a [[u16; 2]],
     /// Folded values `point C_k + neighbour mean C_k` as IEEE half bits, times the component's `value_scale`; zero where the
     /// component does not reach, and beyond the last node. Shape: `[T]` of `[9][GROUP_NODES]`.
     #[rkyv(with = InlineAsBox)]
-    pub tile_values: &'a [[[u16; GROUP_NODES]; FEATURE_COUNT]],
+    pub patch_values: &'a [[[u16; GROUP_NODES]; FEATURE_COUNT]],
 }
 
 /// One autoencoder block, folded: `x_v += tanh(bias + sum_k z_k C_k,v) - tanh(bias)` on its support.

@@ -209,34 +209,34 @@ impl<'a> TierView<'a> {
         native(&self.archived.lane_from_solver)
     }
 
-    /// Shape: `[ceil(N / GROUP_NODES) + 1]`, from 0 to `tile_owners().len()`, never falls.
-    pub fn tile_offsets(&self) -> &'a [u32] {
-        native(&self.archived.tile_offsets)
+    /// Shape: `[ceil(N / GROUP_NODES) + 1]`, from 0 to `patch_owners().len()`, never falls.
+    pub fn patch_offsets(&self) -> &'a [u32] {
+        native(&self.archived.patch_offsets)
     }
 
     /// Component < K and its block, ascending within a group. Shape: `[T]`.
-    pub fn tile_owners(&self) -> &'a [[u16; 2]] {
-        native(&self.archived.tile_owners)
+    pub fn patch_owners(&self) -> &'a [[u16; 2]] {
+        native(&self.archived.patch_owners)
     }
 
     /// Half bits, finite. Shape: `[T]`.
-    pub fn tile_values(&self) -> &'a [[[u16; GROUP_NODES]; FEATURE_COUNT]] {
-        native(&self.archived.tile_values)
+    pub fn patch_values(&self) -> &'a [[[u16; GROUP_NODES]; FEATURE_COUNT]] {
+        native(&self.archived.patch_values)
     }
 
-    /// What the tiles hold that is not zero, group by group.
+    /// What the patches hold that is not zero, group by group.
     pub fn entries(&self) -> impl Iterator<Item = TierEntry> + use<'a> {
         let tier = *self;
         let lanes = tier.solver_from_lane();
-        let groups = tier.tile_offsets().windows(2).zip(lanes.chunks(GROUP_NODES));
+        let groups = tier.patch_offsets().windows(2).zip(lanes.chunks(GROUP_NODES));
         groups.flat_map(move |(row, lanes)| {
             (row[0] as usize..row[1] as usize).flat_map(move |t| {
                 lanes.iter().enumerate().filter_map(move |(n, &solver)| {
                     /// Without the sign: both zeros are zero.
                     const MAGNITUDE: u16 = 0x7fff;
-                    let values = tier.tile_values()[t].map(|row| row[n]);
+                    let values = tier.patch_values()[t].map(|row| row[n]);
                     values.iter().any(|half| half & MAGNITUDE != 0).then_some(TierEntry {
-                        component: usize::from(tier.tile_owners()[t][0]),
+                        component: usize::from(tier.patch_owners()[t][0]),
                         solver: solver as usize,
                         values,
                     })

@@ -10,7 +10,7 @@ use half::f16;
 
 use super::{
     BakedBasis, BakedBlock, BakedComponent, BakedTier, BlockRecord, CompactBasis, ComponentRecord, FAN_VERTICES,
-    FEATURE_COUNT, Fans, GraphConvRecord, Header, NONE, PackageKind, Provenance, Quality, RenderMesh, Tile, Tiles,
+    FEATURE_COUNT, Fans, GraphConvRecord, Header, NONE, PackageKind, Patch, Patches, Provenance, Quality, RenderMesh,
     write_compact,
 };
 
@@ -84,9 +84,9 @@ pub struct TinyTier {
     pub inverse_pivots: Vec<f32>,
     pub solver_from_lane: Vec<u32>,
     pub lane_from_solver: Vec<u32>,
-    pub tile_offsets: Vec<u32>,
-    pub tile_owners: Vec<[u16; 2]>,
-    pub tile_values: Vec<Tile>,
+    pub patch_offsets: Vec<u32>,
+    pub patch_owners: Vec<[u16; 2]>,
+    pub patch_values: Vec<Patch>,
 }
 
 impl TinyCompact {
@@ -179,9 +179,9 @@ impl TinyTier {
             inverse_pivots: &self.inverse_pivots,
             solver_from_lane: &self.solver_from_lane,
             lane_from_solver: &self.lane_from_solver,
-            tile_offsets: &self.tile_offsets,
-            tile_owners: &self.tile_owners,
-            tile_values: &self.tile_values,
+            patch_offsets: &self.patch_offsets,
+            patch_owners: &self.patch_owners,
+            patch_values: &self.patch_values,
         }
     }
 }
@@ -361,10 +361,10 @@ fn fold(compact: &TinyCompact, tier: &mut TinyTier) {
             }
         }
     }
-    let tiles = Tiles::gather(VERTEX_COUNT, entries);
-    tier.tile_offsets = tiles.tile_offsets;
-    tier.tile_owners = tiles.tile_owners;
-    tier.tile_values = tiles.tile_values;
+    let patches = Patches::gather(VERTEX_COUNT, entries);
+    tier.patch_offsets = patches.patch_offsets;
+    tier.patch_owners = patches.patch_owners;
+    tier.patch_values = patches.patch_values;
 }
 
 /// Components without their value scales. Shape: `[K][V]`, source order.

@@ -17,8 +17,8 @@ pub const COMPONENTS: usize = 4096;
 pub const BLOCKS: usize = COMPONENTS + 1;
 /// Entries of all components together.
 pub const ENTRIES: usize = 128 << 20;
-/// Tiles of all components together.
-pub const TILES: usize = 8 << 20;
+/// Patches of all components together.
+pub const PATCHES: usize = 8 << 20;
 /// Steps of all fans together.
 pub const FANS: usize = 32 << 20;
 /// Shapes of the sequence.

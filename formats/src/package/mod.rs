@@ -14,12 +14,12 @@ pub mod fixture;
 mod header;
 pub mod limits;
 mod open;
+#[cfg(feature = "alloc")]
+mod patches;
 mod render;
 mod rules;
 #[cfg(all(test, feature = "alloc"))]
 mod tests;
-#[cfg(feature = "alloc")]
-mod tiles;
 #[cfg(feature = "alloc")]
 mod write;
 
@@ -39,9 +39,9 @@ pub use fans::Fans;
 pub use file::{ReadError, SaveError, read_package, save_package};
 pub use header::{FIRST_VERSION, FORMAT_VERSION, HEADER_BYTES, Header, MAGIC, PAYLOAD_ALIGNMENT, PackageKind};
 pub use open::{CompactEntry, CompactView};
-pub use render::{ArchivedRenderMesh, RenderMesh};
 #[cfg(feature = "alloc")]
-pub use tiles::{Tile, Tiles};
+pub use patches::{Patch, Patches};
+pub use render::{ArchivedRenderMesh, RenderMesh};
 #[cfg(feature = "alloc")]
 pub use write::{AlignedBytes, WriteError, write_baked, write_compact};
 

@@ -64,9 +64,9 @@ pub(crate) fn held<L: Lanes>(
     let group_count = features.len();
     sums.fill([[[0.0; GROUP_NODES]; 3]; TOGETHER]);
     for (g, (features, places)) in features.iter_mut().zip(decoder.places.chunks(GROUP_NODES)).enumerate() {
-        let tiles = decoder.tiles.of(g);
+        let patches = decoder.patches.of(g);
         for lane in (0..places.len()).step_by(L::COUNT) {
-            let x = blend::<L>(decoder, tiles.clone(), lane);
+            let x = blend::<L>(decoder, patches.clone(), lane);
             for c in 0..FEATURE_COUNT {
                 x[c].store(&mut features[c][lane..]);
             }
@@ -101,7 +101,7 @@ pub(crate) fn derivatives<L: Lanes>(
     sums.fill([[[0.0; GROUP_NODES]; 3]; TOGETHER]);
     let one = L::splat(1.0);
     for (g, (features, places)) in features.iter().zip(decoder.places.chunks(GROUP_NODES)).enumerate() {
-        let tiles = decoder.tiles.of(g);
+        let patches = decoder.patches.of(g);
         for lane in (0..places.len()).step_by(L::COUNT) {
             let x = features.each_ref().map(|row| L::load(&row[lane..]));
             let pose = Pose::new(decoder, &x);
@@ -110,19 +110,19 @@ pub(crate) fn derivatives<L: Lanes>(
                 let pull = pull.each_ref().map(|row| L::load(&row[lane..]));
                 adjoints[h] = pose.adjoint(decoder, &pull);
             }
-            let mut t = tiles.start;
-            while t < tiles.end {
-                let (u, end) = block_blend::<L>(decoder, t..tiles.end, lane);
+            let mut t = patches.start;
+            while t < patches.end {
+                let (u, end) = block_blend::<L>(decoder, t..patches.end, lane);
                 let slope = u.map(|u| {
                     let y = tanh(u);
                     y.neg_mul_add(y, one)
                 });
                 for t in t..end {
-                    let k = decoder.tiles.owners[t][0] as usize;
+                    let k = decoder.patches.owners[t][0] as usize;
                     if decoder.shares[k].changed == 0 {
                         continue;
                     }
-                    let values = &decoder.tiles.values[t];
+                    let values = &decoder.patches.values[t];
                     let dx: Row<L> = core::array::from_fn(|c| L::load_halves(&values[c][lane..]).mul(slope[c]));
                     for (adjoint, sums) in adjoints[..held_count].iter().zip(&mut sums[k]) {
                         for c in 0..3 {

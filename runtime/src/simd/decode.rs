@@ -18,12 +18,12 @@ pub(super) type Row<L> = [L; FEATURE_COUNT];
 /// Row-major 3x3 of vectors.
 pub(super) type Matrix<L> = [[L; 3]; 3];
 
-/// The components, by groups of vertices: G groups, T tiles.
+/// The components, by groups of vertices: G groups, T patches.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Tiles<'a> {
+pub(crate) struct Patches<'a> {
     /// Shape: `[G + 1]`.
     pub(crate) offsets: &'a [u32],
-    /// Component and block of each tile, ascending within a group. Shape: `[T]`.
+    /// Component and block of each patch, ascending within a group. Shape: `[T]`.
     pub(crate) owners: &'a [[u16; 2]],
     /// IEEE half bits. Shape: `[T]`.
     pub(crate) values: &'a [Group<u16>],
@@ -61,7 +61,7 @@ pub(crate) struct FeatureScales {
 /// Everything that decode reads.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Decoder<'a> {
-    pub(crate) tiles: Tiles<'a>,
+    pub(crate) patches: Patches<'a>,
     /// Shape: `[K]`.
     pub(crate) shares: &'a [Share],
     /// Shape: `[B]`.
@@ -85,23 +85,31 @@ pub(crate) fn rest_activations<L: Lanes>(blocks: &mut [BlockRest]) {
     }
 }
 
-/// Features and gradients of the groups that a changed component touches; the others stay.
+/// Gradients of the groups that a changed component touches; the others stay. Shape: `gradients` `[N]`, solver order.
 ///
-/// Shape: `features` `[G]`, `gradients` `[N]`, solver order.
+/// Features stay in registers: writing them costs more than computing them again where somebody asks.
 #[inline(always)]
-pub(crate) fn decode<L: Lanes>(decoder: &Decoder<'_>, features: &mut [Group<f32>], gradients: &mut [Gradient]) {
-    for (g, (features, places)) in features.iter_mut().zip(decoder.places.chunks(GROUP_NODES)).enumerate() {
-        let tiles = decoder.tiles.of(g);
+pub(crate) fn decode<L: Lanes>(decoder: &Decoder<'_>, gradients: &mut [Gradient]) {
+    for (g, places) in decoder.places.chunks(GROUP_NODES).enumerate() {
+        let patches = decoder.patches.of(g);
         let changed = |owner: &[u16; 2]| decoder.shares[owner[0] as usize].changed != 0;
-        if !decoder.all && !decoder.tiles.owners[tiles.clone()].iter().any(changed) {
+        if !decoder.all && !decoder.patches.owners[patches.clone()].iter().any(changed) {
             continue;
         }
         for lane in (0..places.len()).step_by(L::COUNT) {
-            let x = blend::<L>(decoder, tiles.clone(), lane);
-            for c in 0..FEATURE_COUNT {
-                x[c].store(&mut features[c][lane..]);
-            }
+            let x = blend::<L>(decoder, patches.clone(), lane);
             scatter(&gradient(decoder.scales, &x), part::<L>(places, lane), gradients);
+        }
+    }
+}
+
+/// Features of group `g`.
+#[inline(always)]
+pub(crate) fn features<L: Lanes>(decoder: &Decoder<'_>, g: usize, features: &mut Group<f32>) {
+    for lane in (0..GROUP_NODES).step_by(L::COUNT) {
+        let x = blend::<L>(decoder, decoder.patches.of(g), lane);
+        for c in 0..FEATURE_COUNT {
+            x[c].store(&mut features[c][lane..]);
         }
     }
 }
@@ -120,20 +128,14 @@ pub(crate) fn gradients<L: Lanes>(
     }
 }
 
-/// Derivatives of all gradients along component `k`, at the pose whose features these are.
+/// Derivatives of all gradients along component `k`, at the pose of the shares.
 ///
 /// `dx = (1 - tanh^2(bias + u)) C_k` where the component reaches, `dT = [J_l(r) dr]x R S + R dS`.
 #[inline(always)]
-pub(crate) fn tangents<L: Lanes>(
-    decoder: &Decoder<'_>,
-    k: usize,
-    scale: f32,
-    features: &[Group<f32>],
-    gradients: &mut [Gradient],
-) {
-    for (g, (features, places)) in features.iter().zip(decoder.places.chunks(GROUP_NODES)).enumerate() {
-        let tiles = decoder.tiles.of(g);
-        let owners = &decoder.tiles.owners[tiles.clone()];
+pub(crate) fn tangents<L: Lanes>(decoder: &Decoder<'_>, k: usize, scale: f32, gradients: &mut [Gradient]) {
+    for (g, places) in decoder.places.chunks(GROUP_NODES).enumerate() {
+        let patches = decoder.patches.of(g);
+        let owners = &decoder.patches.owners[patches.clone()];
         let Some(own) = owners.iter().position(|owner| owner[0] as usize == k) else {
             for &place in places {
                 gradients[place as usize] = [[0.0; 4]; 3];
@@ -142,15 +144,15 @@ pub(crate) fn tangents<L: Lanes>(
         };
         let b = owners[own][1];
         let block = owners.iter().position(|owner| owner[1] == b).unwrap_or(own);
-        let values = &decoder.tiles.values[tiles.start + own];
+        let values = &decoder.patches.values[patches.start + own];
         for lane in (0..places.len()).step_by(L::COUNT) {
-            let (u, _) = block_blend::<L>(decoder, tiles.start + block..tiles.end, lane);
+            let (u, _) = block_blend::<L>(decoder, patches.start + block..patches.end, lane);
             let dx: Row<L> = core::array::from_fn(|c| {
                 let y = tanh(u[c]);
                 let slope = y.neg_mul_add(y, L::splat(1.0)).mul(L::splat(scale));
                 slope.mul(L::load_halves(&values[c][lane..]))
             });
-            let x = features.each_ref().map(|row| L::load(&row[lane..]));
+            let x = blend::<L>(decoder, patches.clone(), lane);
             scatter(
                 &gradient_tangent(decoder.scales, &x, &dx),
                 part::<L>(places, lane),
@@ -166,8 +168,8 @@ fn part<L: Lanes>(places: &[u32], lane: usize) -> &[u32] {
     &places[lane..places.len().min(lane + L::COUNT)]
 }
 
-impl Tiles<'_> {
-    /// The tiles of a group.
+impl Patches<'_> {
+    /// The patches of a group.
     #[inline(always)]
     pub(super) fn of(&self, g: usize) -> core::ops::Range<usize> {
         self.offsets[g] as usize..self.offsets[g + 1] as usize
@@ -176,14 +178,14 @@ impl Tiles<'_> {
 
 /// Features: the sum over the blocks of `tanh(bias + sum_k z_k C_k) - tanh(bias)`, from one lane on.
 #[inline(always)]
-pub(super) fn blend<L: Lanes>(decoder: &Decoder<'_>, tiles: core::ops::Range<usize>, lane: usize) -> Row<L> {
+pub(super) fn blend<L: Lanes>(decoder: &Decoder<'_>, patches: core::ops::Range<usize>, lane: usize) -> Row<L> {
     let mut x = [L::splat(0.0); FEATURE_COUNT];
-    let mut t = tiles.start;
-    while t < tiles.end {
-        let b = decoder.tiles.owners[t][1];
-        let (u, end) = block_blend::<L>(decoder, t..tiles.end, lane);
+    let mut t = patches.start;
+    while t < patches.end {
+        let b = decoder.patches.owners[t][1];
+        let (u, end) = block_blend::<L>(decoder, t..patches.end, lane);
         // A block at rest adds nothing.
-        if decoder.tiles.owners[t..end]
+        if decoder.patches.owners[t..end]
             .iter()
             .any(|owner| decoder.shares[owner[0] as usize].factor != 0.0)
         {
@@ -197,15 +199,15 @@ pub(super) fn blend<L: Lanes>(decoder: &Decoder<'_>, tiles: core::ops::Range<usi
     x
 }
 
-/// `bias + sum_k z_k C_k` of the block that the first tile belongs to, and where its tiles end.
+/// `bias + sum_k z_k C_k` of the block that the first patch belongs to, and where its patches end.
 #[inline(always)]
 pub(super) fn block_blend<L: Lanes>(
     decoder: &Decoder<'_>,
-    tiles: core::ops::Range<usize>,
+    patches: core::ops::Range<usize>,
     lane: usize,
 ) -> (Row<L>, usize) {
-    let owners = &decoder.tiles.owners[tiles.clone()];
-    let values = &decoder.tiles.values[tiles.clone()];
+    let owners = &decoder.patches.owners[patches.clone()];
+    let values = &decoder.patches.values[patches.clone()];
     let b = owners[0][1];
     let mut u = decoder.blocks[b as usize].bias.map(L::splat);
     let mut count = 0;
@@ -222,7 +224,7 @@ pub(super) fn block_blend<L: Lanes>(
         }
         count += 1;
     }
-    (u, tiles.start + count)
+    (u, patches.start + count)
 }
 
 /// `D = exp([r]x) S - I` by rows.

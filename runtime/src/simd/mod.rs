@@ -38,16 +38,21 @@ impl Kernels {
     /// See [`surface::normals`].
     pub(crate) fn normals(self, around: &Around<'_>, posed: &[[f32; 4]], normals: &mut [[f32; 3]]) {
         match self {
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => avx512::normals(around, posed, normals),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => avx2::normals(around, posed, normals),
             _ => surface::normals(around, posed, normals),
         }
     }
 
     dispatch!(rest_activations(blocks: &mut [BlockRest]));
-    dispatch!(decode(decoder: &Decoder<'_>, features: &mut [Group<f32>], gradients: &mut [Gradient]));
+    dispatch!(decode(decoder: &Decoder<'_>, gradients: &mut [Gradient]));
+    dispatch!(features(decoder: &Decoder<'_>, g: usize, features: &mut Group<f32>));
     dispatch!(gradients(scales: FeatureScales, features: &Group<f32>, places: &[u32], gradients: &mut [Gradient]));
     dispatch!(held(decoder: &Decoder<'_>, pulls: &[Pull], features: &mut [Group<f32>], sums: &mut [HeldSums]));
     dispatch!(derivatives(decoder: &Decoder<'_>, pulls: &[Pull], features: &[Group<f32>], sums: &mut [HeldSums]));
-    dispatch!(tangents(decoder: &Decoder<'_>, k: usize, scale: f32, features: &[Group<f32>], gradients: &mut [Gradient]));
+    dispatch!(tangents(decoder: &Decoder<'_>, k: usize, scale: f32, gradients: &mut [Gradient]));
 }
 
 /// A set of kernels.

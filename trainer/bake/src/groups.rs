@@ -1,13 +1,13 @@
 //! The order in which a frame decodes: nodes in groups of sixteen that the same components move, and each component's
-//! values in tiles, one a group that it touches.
+//! values in patches, one a group that it touches.
 //!
-//! A tile is whole, with zeros where the component does not reach, so the frame needs no index inside it; the order keeps
+//! A patch is whole, with zeros where the component does not reach, so the frame needs no index inside it; the order keeps
 //! the zeros few. It splits the nodes by one component after another, most even splits first, in the reflected order of a
 //! Gray code, and then lets each group pick its members from a window of that order.
 
 use std::collections::VecDeque;
 
-use sinew_formats::package::{GROUP_NODES, Tiles};
+use sinew_formats::package::{GROUP_NODES, Patches};
 
 use crate::fold::FoldedComponent;
 
@@ -42,8 +42,8 @@ impl LaneOrder {
         }
     }
 
-    /// The components' tiles in this order. `block_of_component` `[K]`.
-    pub fn tiles(&self, components: &[FoldedComponent], block_of_component: &[u32]) -> Tiles {
+    /// The components' patches in this order. `block_of_component` `[K]`.
+    pub fn patches(&self, components: &[FoldedComponent], block_of_component: &[u32]) -> Patches {
         let entries = components.iter().enumerate().flat_map(|(k, component)| {
             let pairs = component.solver_indices.iter().zip(&component.values);
             pairs.map(move |(&solver, &values)| {
@@ -51,7 +51,7 @@ impl LaneOrder {
                 (k, block_of_component[k], lane, values)
             })
         });
-        Tiles::gather(self.solver_from_lane.len(), entries)
+        Patches::gather(self.solver_from_lane.len(), entries)
     }
 }
 

@@ -70,7 +70,7 @@ pub fn bake(package: &CompactView<'_>) -> Result<AlignedBytes, BakeError> {
     let degrees: Vec<usize> = rings.offsets.windows(2).map(|row| (row[1] - row[0]) as usize).collect();
     let lanes = LaneOrder::new(&folded, &groups::nearby(&rest_positions), &degrees);
     let block_of_component: Vec<u32> = package.components().map(|component| component.block).collect();
-    let tiles = lanes.tiles(&folded, &block_of_component);
+    let patches = lanes.patches(&folded, &block_of_component);
     let lane_from_vertex: Vec<u32> = order
         .solver_from_vertex
         .iter()
@@ -120,9 +120,9 @@ pub fn bake(package: &CompactView<'_>) -> Result<AlignedBytes, BakeError> {
             inverse_pivots: &factor.inverse_pivots,
             solver_from_lane: &lanes.solver_from_lane,
             lane_from_solver: &lanes.lane_from_solver,
-            tile_offsets: &tiles.tile_offsets,
-            tile_owners: &tiles.tile_owners,
-            tile_values: &tiles.tile_values,
+            patch_offsets: &patches.patch_offsets,
+            patch_owners: &patches.patch_owners,
+            patch_values: &patches.patch_values,
         },
         fast: None,
         render: package.render_mesh(),

@@ -71,7 +71,7 @@ fn tier(view: &BakedView<'_>, tier: &TierView<'_>) -> Result<(), OpenError> {
     rings(tier)?;
     factor(tier)?;
     lanes(tier)?;
-    tiles(view, tier)
+    patches(view, tier)
 }
 
 fn rings(tier: &TierView<'_>) -> Result<(), OpenError> {
@@ -148,37 +148,37 @@ fn lanes(tier: &TierView<'_>) -> Result<(), OpenError> {
     )
 }
 
-fn tiles(view: &BakedView<'_>, tier: &TierView<'_>) -> Result<(), OpenError> {
-    let (owners, values) = (tier.tile_owners(), tier.tile_values());
-    count("tile_owners", owners.len(), 0, limits::TILES)?;
-    same_count("tile_values", values.len(), owners.len())?;
+fn patches(view: &BakedView<'_>, tier: &TierView<'_>) -> Result<(), OpenError> {
+    let (owners, values) = (tier.patch_owners(), tier.patch_values());
+    count("patch_owners", owners.len(), 0, limits::PATCHES)?;
+    same_count("patch_values", values.len(), owners.len())?;
     let group_count = tier.node_count().div_ceil(GROUP_NODES);
-    offsets("tile_offsets", tier.tile_offsets(), group_count, owners.len())?;
-    for row in tier.tile_offsets().windows(2) {
+    offsets("patch_offsets", tier.patch_offsets(), group_count, owners.len())?;
+    for row in tier.patch_offsets().windows(2) {
         let mut previous = None;
         for index in row[0] as usize..row[1] as usize {
             let [component, block] = owners[index];
-            below("tile_owners", index, u32::from(component), view.component_count())?;
+            below("patch_owners", index, u32::from(component), view.component_count())?;
             if previous.is_some_and(|previous| component <= previous) {
                 return Err(OpenError::NotAscending {
-                    field: "tile_owners",
+                    field: "patch_owners",
                     index,
                 });
             }
             // Components stand in block order, so the blocks ascend too.
             if view.component(component as usize).block != u32::from(block) {
                 return Err(OpenError::NotContiguous {
-                    field: "tile_owners",
+                    field: "patch_owners",
                     index,
                 });
             }
             previous = Some(component);
         }
     }
-    for (tile, rows) in values.iter().enumerate() {
-        finite_halves("tile_values", rows).map_err(|_| OpenError::NotFinite {
-            field: "tile_values",
-            index: tile,
+    for (patch, rows) in values.iter().enumerate() {
+        finite_halves("patch_values", rows).map_err(|_| OpenError::NotFinite {
+            field: "patch_values",
+            index: patch,
         })?;
     }
     Ok(())

@@ -7,7 +7,7 @@ use crate::simd::lanes::{Gradient, Lanes};
 
 /// One register.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Eight(__m256);
+pub(super) struct Eight(pub(super) __m256);
 
 // SAFETY, of every block here: the instructions are present, see the head of `avx2/mod.rs`; loads and stores are unaligned
 // and stay inside a slice whose length was checked.

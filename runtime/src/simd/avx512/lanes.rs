@@ -7,7 +7,7 @@ use crate::simd::lanes::{Gradient, Lanes};
 
 /// One register.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sixteen(__m512);
+pub(super) struct Sixteen(pub(super) __m512);
 
 // SAFETY, of every block here: the instructions are present, see the head of `avx512/mod.rs`; loads and stores are unaligned
 // and stay inside a slice whose length was checked.

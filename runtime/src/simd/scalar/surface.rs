@@ -1,7 +1,8 @@
 //! Displacements to what a renderer wants: positions in source order, their bounding box, and vertex normals.
 
-use libm::sqrtf;
 use sinew_formats::package::FAN_VERTICES;
+
+use crate::simd::lanes::{Lanes, One};
 
 /// Normal of a vertex without area around it: unused, or all its triangles are degenerate.
 pub const FALLBACK_NORMAL: [f32; 3] = [0.0, 0.0, 1.0];
@@ -49,17 +50,20 @@ pub(crate) fn scatter(
     positions: &mut [[f32; 3]],
 ) -> Result<Bounds, u32> {
     let mut bounds = Bounds::EMPTY;
-    let mut finite = true;
+    // Stays zero while all are finite.
+    let mut trace = [0.0_f32; 3];
     let nodes = rest.iter().zip(displacement);
     let targets = places.vertex_from_solver.iter().zip(places.lane_from_solver);
     for ((r, d), (&v, &lane)) in nodes.clone().zip(targets) {
         let p = [r[0] + d[0], r[1] + d[1], r[2] + d[2]];
-        finite &= p[0].abs().max(p[1].abs()).max(p[2].abs()) <= f32::MAX && !(p[0] + p[1] + p[2]).is_nan();
+        for c in 0..3 {
+            trace[c] += 0.0 * p[c];
+        }
         bounds.include(&p);
         positions[v as usize] = p;
         posed[lane as usize] = [p[0], p[1], p[2], 0.0];
     }
-    if finite {
+    if trace == [0.0; 3] {
         return Ok(bounds);
     }
     let lost = nodes
@@ -86,11 +90,17 @@ pub(crate) struct Around<'a> {
 ///
 /// A vertex without area gets [`FALLBACK_NORMAL`].
 pub(crate) fn normals(around: &Around<'_>, posed: &[[f32; 4]], normals: &mut [[f32; 3]]) {
-    for (lane, &solver) in around.solver_from_lane.iter().enumerate() {
+    normals_from(0, around, posed, normals);
+}
+
+/// Those of the lanes from `first` on.
+pub(crate) fn normals_from(first: usize, around: &Around<'_>, posed: &[[f32; 4]], normals: &mut [[f32; 3]]) {
+    for (lane, &solver) in around.solver_from_lane.iter().enumerate().skip(first) {
         let (quad, column) = (lane / FAN_VERTICES, lane % FAN_VERTICES);
         let fan = &around.fans[around.offsets[quad] as usize..around.offsets[quad + 1] as usize];
         let v = around.vertex_from_solver[solver as usize];
-        normals[v as usize] = unit(&area(posed, lane, fan.iter().map(|step| step[column])));
+        let sum = area(posed, lane, fan.iter().map(|step| step[column]));
+        normals[v as usize] = unit(sum.map(One)).map(|One(x)| x);
     }
 }
 
@@ -118,17 +128,20 @@ fn area(posed: &[[f32; 4]], centre: usize, mut walk: impl Iterator<Item = u32>) 
     sum
 }
 
-fn unit(n: &[f32; 3]) -> [f32; 3] {
+/// Vectors of length one; [`FALLBACK_NORMAL`] for one of no length, or of one that left f32.
+#[inline(always)]
+pub(crate) fn unit<L: Lanes>(n: [L; 3]) -> [L; 3] {
+    /// More than the inverse length of what has a largest entry of one.
+    const INVERSE_END: f32 = 2.0;
+    let (zero, one) = (L::splat(0.0), L::splat(1.0));
+    let [x, y, z] = n.map(|x| x.max(zero.sub(x)));
     // By the largest entry first: the square of a small or a large area would leave f32.
-    let inverse = 1.0 / n[0].abs().max(n[1].abs()).max(n[2].abs());
-    let m = n.map(|x| x * inverse);
-    let inverse = 1.0 / sqrtf(m[0] * m[0] + m[1] * m[1] + m[2] * m[2]);
-    // Zero or overflowed area: the quotient above is not a number, or nothing is left.
-    if inverse > 0.0 && inverse < 2.0 {
-        m.map(|x| x * inverse)
-    } else {
-        FALLBACK_NORMAL
-    }
+    let inverse = one.div(x.max(y).max(z));
+    let m = n.map(|x| x.mul(inverse));
+    let inverse = one.div(m[0].mul(m[0]).add(m[1].mul(m[1])).add(m[2].mul(m[2])).sqrt());
+    // Not a number where the largest entry was zero, infinite or none itself.
+    let valid = inverse.select_below(L::splat(INVERSE_END), inverse, zero);
+    core::array::from_fn(|c| zero.select_below(valid, m[c].mul(valid), L::splat(FALLBACK_NORMAL[c])))
 }
 
 #[cfg(test)]

@@ -1,0 +1,80 @@
+//! Vertex normals, two vertices to a register while their fans are walked, eight for the unit vectors. The same operations in
+//! the same order as the scalar kernel: the same bits.
+#![allow(unsafe_code)]
+
+use core::arch::x86_64::*;
+
+use sinew_formats::package::FAN_VERTICES;
+
+use super::lanes::Eight;
+use crate::simd::Kernels;
+use crate::simd::lanes::Lanes;
+use crate::simd::scalar::surface::{self, Around};
+
+/// See [`surface::normals`].
+pub(crate) fn normals(around: &Around<'_>, posed: &[[f32; 4]], normals: &mut [[f32; 3]]) {
+    assert!(Kernels::Avx2.run_here());
+    // SAFETY: the instructions are present.
+    unsafe { compiled(around, posed, normals) }
+}
+
+#[target_feature(enable = "avx2,fma,f16c")]
+fn compiled(around: &Around<'_>, posed: &[[f32; 4]], normals: &mut [[f32; 3]]) {
+    let (groups, _) = around.solver_from_lane.as_chunks::<{ Eight::COUNT }>();
+    let rows = around.offsets.windows(2).map(|row| row[0] as usize..row[1] as usize);
+    let mut quads = posed.as_chunks::<FAN_VERTICES>().0.iter().zip(rows);
+    for solvers in groups {
+        let mut sums = [[_mm256_setzero_ps(); 2]; 2];
+        for (sum, (centre, row)) in sums.iter_mut().zip(&mut quads) {
+            *sum = area(posed, centre, &around.fans[row]);
+        }
+        // Entries in the order z x y; vertex 2 i + n is half n of sum i.
+        let [low, high] = sums.map(|[a, b]| _mm256_unpacklo_ps(a, b));
+        let [low_y, high_y] = sums.map(|[a, b]| _mm256_unpackhi_ps(a, b));
+        let x = _mm256_shuffle_ps::<0xee>(low, high);
+        let y = _mm256_shuffle_ps::<0x44>(low_y, high_y);
+        let z = _mm256_shuffle_ps::<0x44>(low, high);
+        let mut unit = [[0.0; Eight::COUNT]; 3];
+        for (row, unit) in surface::unit([x, y, z].map(Eight)).into_iter().zip(&mut unit) {
+            row.store(unit);
+        }
+        for (lane, &solver) in solvers.iter().enumerate() {
+            let n = lane % 2 * 4 + lane / 2;
+            normals[around.vertex_from_solver[solver as usize] as usize] = unit.map(|row| row[n]);
+        }
+    }
+    surface::normals_from(groups.len() * Eight::COUNT, around, posed, normals);
+}
+
+/// Twice the area vectors around four vertices, two and two.
+#[target_feature(enable = "avx2,fma,f16c")]
+fn area(posed: &[[f32; 4]], centre: &[[f32; 4]; FAN_VERTICES], fan: &[[u32; FAN_VERTICES]]) -> [__m256; 2] {
+    /// Entries y z x, and the last one where it is.
+    const TURN: i32 = 0xc9;
+    // SAFETY: eight numbers from the first and the third vertex on, and four below.
+    let centre = [0, 2].map(|n| unsafe { _mm256_loadu_ps(centre[n..n + 2].as_ptr().cast()) });
+    let edges = |step: &[u32; FAN_VERTICES]| {
+        let [a, b, c, d] = step.map(|lane| unsafe { _mm_loadu_ps(posed[lane as usize].as_ptr()) });
+        [
+            _mm256_sub_ps(_mm256_set_m128(b, a), centre[0]),
+            _mm256_sub_ps(_mm256_set_m128(d, c), centre[1]),
+        ]
+    };
+    let mut sum = [_mm256_setzero_ps(); 2];
+    let Some((first, rest)) = fan.split_first() else {
+        return sum;
+    };
+    let mut a = edges(first);
+    let mut a_turned = a.map(|a| _mm256_permute_ps::<TURN>(a));
+    for step in rest {
+        let b = edges(step);
+        let b_turned = b.map(|b| _mm256_permute_ps::<TURN>(b));
+        for n in 0..2 {
+            // No fused product: two equal edges must give zero.
+            let cross = _mm256_sub_ps(_mm256_mul_ps(a[n], b_turned[n]), _mm256_mul_ps(a_turned[n], b[n]));
+            sum[n] = _mm256_add_ps(sum[n], cross);
+        }
+        (a, a_turned) = (b, b_turned);
+    }
+    sum
+}
