@@ -72,7 +72,7 @@ pub(crate) fn held<L: Lanes>(
             }
             let d = gradient(decoder.scales, &x);
             for (h, pull) in pulls.iter().skip(g).step_by(group_count).enumerate() {
-                let pull = pull.each_ref().map(|row| L::load(&row[lane..]));
+                let pull = load::<L>(pull, lane);
                 let sums = &mut sums[h / TOGETHER][h % TOGETHER];
                 for c in 0..3 {
                     let row = [d[3 * c], d[3 * c + 1], d[3 * c + 2]];
@@ -99,31 +99,38 @@ pub(crate) fn derivatives<L: Lanes>(
     let group_count = features.len();
     let held_count = pulls.len().checked_div(group_count).unwrap_or(0).min(TOGETHER);
     sums.fill([[[0.0; GROUP_NODES]; 3]; TOGETHER]);
-    let one = L::splat(1.0);
+    let (zero, one) = (L::splat(0.0), L::splat(1.0));
     for (g, (features, places)) in features.iter().zip(decoder.places.chunks(GROUP_NODES)).enumerate() {
         let patches = decoder.patches.of(g);
         for lane in (0..places.len()).step_by(L::COUNT) {
-            let x = features.each_ref().map(|row| L::load(&row[lane..]));
+            let mut x = [zero; FEATURE_COUNT];
+            for c in 0..FEATURE_COUNT {
+                x[c] = L::load(&features[c][lane..]);
+            }
             let pose = Pose::new(decoder, &x);
-            let mut adjoints = [[[L::splat(0.0); FEATURE_COUNT]; 3]; TOGETHER];
+            let mut adjoints = [[[zero; FEATURE_COUNT]; 3]; TOGETHER];
             for (h, pull) in pulls.iter().skip(g).step_by(group_count).take(TOGETHER).enumerate() {
-                let pull = pull.each_ref().map(|row| L::load(&row[lane..]));
+                let pull = load::<L>(pull, lane);
                 adjoints[h] = pose.adjoint(decoder, &pull);
             }
             let mut t = patches.start;
             while t < patches.end {
                 let (u, end) = block_blend::<L>(decoder, t..patches.end, lane);
-                let slope = u.map(|u| {
-                    let y = tanh(u);
-                    y.neg_mul_add(y, one)
-                });
+                let mut slope = [zero; FEATURE_COUNT];
+                for c in 0..FEATURE_COUNT {
+                    let y = tanh(u[c]);
+                    slope[c] = y.neg_mul_add(y, one);
+                }
                 for t in t..end {
                     let k = decoder.patches.owners[t][0] as usize;
                     if decoder.shares[k].changed == 0 {
                         continue;
                     }
                     let values = &decoder.patches.values[t];
-                    let dx: Row<L> = core::array::from_fn(|c| L::load_halves(&values[c][lane..]).mul(slope[c]));
+                    let mut dx = [zero; FEATURE_COUNT];
+                    for c in 0..FEATURE_COUNT {
+                        dx[c] = L::load_halves(&values[c][lane..]).mul(slope[c]);
+                    }
                     for (adjoint, sums) in adjoints[..held_count].iter().zip(&mut sums[k]) {
                         for c in 0..3 {
                             let mut sum = L::load(&sums[c][lane..]);
@@ -138,6 +145,16 @@ pub(crate) fn derivatives<L: Lanes>(
             }
         }
     }
+}
+
+/// A pull from one lane on. Loops, here and below: closures over arrays would not be compiled into the kernel.
+#[inline(always)]
+fn load<L: Lanes>(pull: &Pull, lane: usize) -> [L; 3] {
+    [
+        L::load(&pull[0][lane..]),
+        L::load(&pull[1][lane..]),
+        L::load(&pull[2][lane..]),
+    ]
 }
 
 /// What the adjoints of all handles share at one group of vertices.
@@ -156,7 +173,12 @@ impl<L: Lanes> Pose<L> {
         let (e, turn) = rotation_less_identity(&r);
         let rotation = plus_identity(e);
         let stretch = plus_identity(stretch_less_identity(decoder.scales, x));
-        let deformation = core::array::from_fn(|i| core::array::from_fn(|j| product(&rotation, &stretch, i, j)));
+        let mut deformation = rotation;
+        for i in 0..3 {
+            for j in 0..3 {
+                deformation[i][j] = product(&rotation, &stretch, i, j);
+            }
+        }
         Self {
             r,
             jacobian: turn.jacobian(),
@@ -170,19 +192,23 @@ impl<L: Lanes> Pose<L> {
     #[inline(always)]
     fn adjoint(&self, decoder: &Decoder<'_>, g: &[L; 3]) -> [Row<L>; 3] {
         let (rotation_scale, stretch_scale) = (L::splat(decoder.scales.rotation), L::splat(decoder.scales.stretch));
-        let y = self.deformation.each_ref().map(|row| dot(row, g));
         let zero = L::splat(0.0);
+        let (mut y, mut scaled) = ([zero; 3], [zero; 3]);
+        for i in 0..3 {
+            y[i] = dot(&self.deformation[i], g);
+            scaled[i] = g[i].mul(stretch_scale);
+        }
         let [a, b, along_axis] = self.jacobian;
         let r = &self.r;
-        let scaled = g.map(|g| g.mul(stretch_scale));
-        core::array::from_fn(|c| {
+        let mut adjoint = [[zero; FEATURE_COUNT]; 3];
+        for c in 0..3 {
             let (j, k) = ((c + 1) % 3, (c + 2) % 3);
             let mut z = [zero; 3];
             z[j] = y[k];
             z[k] = zero.sub(y[j]);
             let along = along_axis.mul(dot(r, &z));
             let row = &self.rotation[c];
-            let mut out = [zero; FEATURE_COUNT];
+            let out = &mut adjoint[c];
             for i in 0..3 {
                 let (j, k) = ((i + 1) % 3, (i + 2) % 3);
                 let turned = r[j].mul(z[k]).sub(r[k].mul(z[j]));
@@ -195,7 +221,7 @@ impl<L: Lanes> Pose<L> {
             out[6] = row[1].mul(scaled[1]);
             out[7] = row[1].mul_add(scaled[2], row[2].mul(scaled[1]));
             out[8] = row[2].mul(scaled[2]);
-            out
-        })
+        }
+        adjoint
     }
 }
