@@ -5,6 +5,9 @@
 //! solve (right-hand side, `L d = b`) -> positions -> [`Normals`]. [`Frame`] runs it; [`Tangent`] is its derivative along
 //! one control; [`Reconstruct`] enters it behind the network, with features of one's own.
 //!
+//! Around it: [`Handles`] and [`Drag`] find the weights that bring held vertices to where they are wanted; [`VertexOutput`]
+//! writes a frame as an engine's vertex buffer; [`Batch`] plays many instances on threads that the caller lends.
+//!
 //! ```no_run
 //! use sinew_runtime::{Basis, Controls, Frame, Workspace, WorkspaceLayout};
 //! # fn play(bytes: &[u8], memory: &mut [u8], weights: &mut [f32], positions: &mut [[f32; 3]], normals: &mut [[f32; 3]])

@@ -289,5 +289,5 @@ fn handles_output_and_batches_allocate_nothing() {
         }
     });
     assert_eq!(count, 0);
-    assert!(steps > 100, "{steps} steps");
+    assert!(steps > 20, "{steps} steps");
 }
