@@ -8,7 +8,7 @@ use std::vec::Vec;
 
 use half::f16;
 use sinew_formats::package::{
-    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedTier, Fans, NONE, Patches, write_baked,
+    AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedTier, Fans, NONE, Patches, RenderMesh, write_baked,
 };
 
 use crate::basis::Basis;
@@ -314,6 +314,7 @@ impl Package {
                 patch_values: &patches.patch_values,
             },
             fast: None,
+            render: RenderMesh::NONE,
         })
         .unwrap();
         let rest_in_source_order = grid.lane_from_vertex.iter().map(|&s| grid.rest[s as usize]).collect();

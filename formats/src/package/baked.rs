@@ -13,7 +13,7 @@ use rkyv::{
     with::{ArchiveWith, InlineAsBox, SerializeWith},
 };
 
-use super::{FAN_VERTICES, FEATURE_COUNT, GROUP_NODES};
+use super::{FAN_VERTICES, FEATURE_COUNT, GROUP_NODES, RenderMesh};
 
 /// Nodes of a block, and rows and columns of a tile.
 pub const TILE_SIDE: usize = 4;
@@ -87,6 +87,8 @@ pub struct BakedBasis<'a> {
     pub exact: BakedTier<'a>,
     /// A tier of fewer nodes.
     pub fast: Option<BakedTier<'a>>,
+    /// What an engine draws.
+    pub render: RenderMesh<'a>,
 }
 
 /// What a frame reads from decode to solve, for a set of N nodes: all vertices, or a graph that stands for them. Lanes number

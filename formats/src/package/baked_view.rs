@@ -4,9 +4,9 @@ use rkyv::{api::low::access, rancor::Failure};
 
 use super::{
     ArchivedBakedBasis, ArchivedBakedTier, BakedBlock, BakedComponent, FAN_VERTICES, FEATURE_COUNT, GROUP_NODES,
-    Header, OpenError, PackageKind, TILE_ENTRIES, TILE_SIDE,
+    Header, OpenError, PackageKind, RenderMesh, TILE_ENTRIES, TILE_SIDE,
     open::{native, payload},
-    rules,
+    render, rules,
 };
 
 /// An opened baked package; borrows its bytes. Fields mean what [`super::BakedBasis`] says.
@@ -145,6 +145,11 @@ impl<'a> BakedView<'a> {
     /// The tier of fewer nodes, where the package has one.
     pub fn fast(&self) -> Option<TierView<'a>> {
         self.archived.fast.as_ref().map(|archived| TierView { archived })
+    }
+
+    /// What an engine draws; all empty where the source has no texture coordinates.
+    pub fn render_mesh(&self) -> RenderMesh<'a> {
+        render::view(&self.archived.render)
     }
 }
 

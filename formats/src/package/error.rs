@@ -175,6 +175,11 @@ pub enum OpenError {
         /// Element.
         index: usize,
     },
+    /// A triangle of render vertices is not the triangle it should be.
+    RenderFaceDiffers {
+        /// Triangle.
+        face: usize,
+    },
     /// A bit beyond the last vertex is set.
     BitmapTail {
         /// Component.
@@ -314,6 +319,10 @@ impl fmt::Display for OpenError {
                     "`{field}` {index} differs from the same edge in the other direction"
                 )
             }
+            Self::RenderFaceDiffers { face } => write!(
+                out,
+                "render triangle {face} does not stand for the corners of triangle {face}"
+            ),
             Self::BitmapTail { component } => {
                 write!(
                     out,

@@ -10,8 +10,8 @@ use half::f16;
 
 use super::{
     BakedBasis, BakedBlock, BakedComponent, BakedTier, BlockRecord, CompactBasis, ComponentRecord, FAN_VERTICES,
-    FEATURE_COUNT, Fans, GraphConvRecord, Header, NONE, PackageKind, Patch, Patches, Provenance, Quality, TILE_ENTRIES,
-    TILE_SIDE, write_compact,
+    FEATURE_COUNT, Fans, GraphConvRecord, Header, NONE, PackageKind, Patch, Patches, Provenance, Quality, RenderMesh,
+    TILE_ENTRIES, TILE_SIDE, write_compact,
 };
 
 /// V of the grid.
@@ -39,6 +39,7 @@ pub struct TinyCompact {
     pub values: Vec<[u16; FEATURE_COUNT]>,
     pub provenance: Provenance<'static>,
     pub quality: Quality,
+    pub render: TinyRender,
 }
 
 /// Owns what a [`BakedBasis`] borrows; a test changes a field and writes.
@@ -57,6 +58,16 @@ pub struct TinyBaked {
     pub fans: Vec<[u32; FAN_VERTICES]>,
     pub exact: TinyTier,
     pub fast: Option<TinyTier>,
+    pub render: TinyRender,
+}
+
+/// Owns what a [`RenderMesh`] borrows.
+#[derive(Debug, Clone, Default)]
+#[expect(missing_docs, reason = "fields are those of RenderMesh")]
+pub struct TinyRender {
+    pub vertices: Vec<u32>,
+    pub uvs: Vec<[f32; 2]>,
+    pub faces: Vec<[u32; 3]>,
 }
 
 /// Owns what a [`BakedTier`] borrows.
@@ -94,6 +105,7 @@ impl TinyCompact {
             values: &self.values,
             provenance: self.provenance,
             quality: self.quality,
+            render: self.render.mesh(),
         }
     }
 }
@@ -114,7 +126,43 @@ impl TinyBaked {
             fans: &self.fans,
             exact: self.exact.tier(),
             fast: self.fast.as_ref().map(TinyTier::tier),
+            render: self.render.mesh(),
         }
+    }
+}
+
+impl TinyRender {
+    fn mesh(&self) -> RenderMesh<'_> {
+        RenderMesh {
+            vertices: &self.vertices,
+            uvs: &self.uvs,
+            faces: &self.faces,
+        }
+    }
+
+    /// The texture folds along the middle column: the seam's vertices have one more texture coordinate for the triangles on
+    /// their right, whose texture is mirrored.
+    fn with_seam(rest_positions: &[[f32; 3]], faces: &[[u32; 3]]) -> Self {
+        let mut render = Self::default();
+        for face in faces {
+            let right = face.iter().any(|v| v % 3 == 2);
+            let corners = face.map(|v| {
+                let [x, y, _] = rest_positions[v as usize];
+                let uv = if right {
+                    [1.0 - 0.25 * x, 0.25 * y]
+                } else {
+                    [0.25 * x, 0.25 * y]
+                };
+                let known = (0..render.vertices.len()).find(|&r| render.vertices[r] == v && render.uvs[r] == uv);
+                known.unwrap_or_else(|| {
+                    render.vertices.push(v);
+                    render.uvs.push(uv);
+                    render.vertices.len() - 1
+                }) as u32
+            });
+            render.faces.push(corners);
+        }
+        render
     }
 }
 
@@ -201,6 +249,7 @@ pub fn tiny_compact() -> TinyCompact {
             steps: 30,
             steps_run: 40,
         },
+        render: TinyRender::with_seam(&rest_positions(), &faces()),
     }
 }
 
@@ -243,6 +292,7 @@ pub fn tiny_baked() -> TinyBaked {
         fans: fans.fans,
         exact,
         fast: None,
+        render: compact.render.clone(),
     }
 }
 

@@ -122,6 +122,7 @@ pub fn bake(package: &CompactView<'_>) -> Result<AlignedBytes, BakeError> {
             patch_values: &patches.patch_values,
         },
         fast: None,
+        render: package.render_mesh(),
     })
     .map_err(BakeError::Refused)
 }

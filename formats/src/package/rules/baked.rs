@@ -2,7 +2,7 @@
 //! errors bear the same names.
 
 use super::{
-    super::{BakedView, FAN_VERTICES, GROUP_NODES, OpenError, TILE_ENTRIES, TILE_SIDE, TierView, limits},
+    super::{BakedView, FAN_VERTICES, GROUP_NODES, OpenError, TILE_ENTRIES, TILE_SIDE, TierView, limits, render},
     BlockLinks, ascending_below, below, control, count, faces, finite_halves, names, offsets, positions, positive,
     same_count, tree, within,
 };
@@ -47,7 +47,7 @@ pub(in super::super) fn check(view: &BakedView<'_>) -> Result<(), OpenError> {
         count("rest_positions", node_count, 1, vertex_count)?;
         tier(view, &fast)?;
     }
-    Ok(())
+    render::check(&view.render_mesh(), view.faces(), vertex_count)
 }
 
 /// Both lists have `count` indices < `count` and the second undoes the first, so both are permutations.

@@ -2,11 +2,12 @@
 
 mod baked;
 mod compact;
+mod render;
 
 use alloc::string::String;
 
 use super::super::fixture::{
-    COMPONENT_COUNT, TinyBaked, TinyCompact, TinyTier, VERTEX_COUNT, tiny_baked, tiny_compact,
+    COMPONENT_COUNT, TinyBaked, TinyCompact, TinyRender, TinyTier, VERTEX_COUNT, tiny_baked, tiny_compact,
 };
 use super::super::*;
 use OpenError::*;
