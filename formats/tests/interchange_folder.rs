@@ -3,6 +3,7 @@
 use sinew_formats::interchange::{
     MeshKind, MeshSequence, Notice, Place, PolygonMesh, SequenceError, SequenceRead, WriteError, read_sequence,
     write_npy_f32, write_npy_u32, write_npy_vertices, write_obj, write_ply, write_sequence_npy, write_sequence_obj,
+    write_textured_obj,
 };
 use std::fs;
 use std::path::Path;
@@ -197,6 +198,7 @@ fn sequence() -> MeshSequence {
         faces: vec![[0, 1, 2], [0, 2, 3]],
         shapes: (0..3).map(shape).collect(),
         shape_names,
+        render: None,
     }
 }
 
@@ -223,6 +225,35 @@ fn written_sequences_read_back_to_the_same_bits() {
         .map(|entry| entry.unwrap().file_name())
         .collect();
     assert_eq!(left.len(), 2, "temporary files left: {left:?}");
+}
+
+#[test]
+fn texture_coordinates_are_read_with_the_reference_and_written_again() {
+    let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+    let textured = format!("{square}vt 0 0\nvt 1 0\nvt 1 1\nvt .5 .5\nf 1/1 2/2 3/3\nf 1/4 3/3 4/4\n");
+    let plain = format!("{square}f 1 2 3\nf 1 3 4\n");
+    // Only the reference's count, so the others may have none.
+    let first = folder(&[("a.obj", &textured), ("b.obj", &plain.replace("1 1 0", "1 1 1"))]);
+    let sequence = read(first.path()).unwrap().sequence;
+    let render = sequence.render.clone().unwrap();
+    assert_eq!((&render.vertices[..], render.faces.len()), (&[0, 1, 2, 0, 3][..], 2));
+    assert_eq!(render.uvs[3], [0.5, 0.5]);
+    let again = tempfile::tempdir().unwrap();
+    write_sequence_obj(again.path(), &sequence).unwrap();
+    assert_eq!(read(again.path()).unwrap().sequence.render, Some(render));
+
+    let second = folder(&[("a.obj", &plain), ("b.obj", &textured)]);
+    assert_eq!(read(second.path()).unwrap().sequence.render, None);
+    let broken = textured.replace("vt 1 1", "vt 1 up");
+    let third = folder(&[("a.obj", &broken), ("b.obj", &plain)]);
+    let odd = read(third.path()).unwrap();
+    assert_eq!(odd.sequence.render, None);
+    assert_eq!(odd.notices, [Notice::TextureIgnored { line: 7 }]);
+    assert!(odd.notices[0].to_string().contains("line 7"));
+
+    let path = again.path().join("x.obj");
+    let error = write_textured_obj(&path, &[], &[[0; 3]], &[], &[]).unwrap_err();
+    assert!(error.to_string().contains("texture faces") && !path.exists());
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use sinew_formats::package::{BakedBlock, BakedView, FastError, FastView, NONE, OpenError, TierView};
+use sinew_formats::package::{BakedBlock, BakedView, FastError, FastView, NONE, OpenError, RenderMesh, TierView};
 
 use crate::simd::decode::{FeatureScales, Patches};
 use crate::simd::scalar::poisson::{Factor, Rings};
@@ -108,6 +108,19 @@ impl<'a> Basis<'a> {
     /// Triangles. Shape: `[F]`, source order, counter-clockwise.
     pub fn faces(&self) -> &'a [[u32; 3]] {
         self.view.faces()
+    }
+
+    /// What an engine draws: render vertices with texture coordinates; all empty where the package has none.
+    pub fn render_mesh(&self) -> RenderMesh<'a> {
+        self.view.render_mesh()
+    }
+
+    /// R: vertices that an engine draws. V where the package has no texture coordinates.
+    pub fn render_vertex_count(&self) -> usize {
+        match self.render_mesh().vertices.len() {
+            0 => self.vertex_count(),
+            count => count,
+        }
     }
 
     /// Rest shape. Shape: `[V]`, in **lanes**: the order in which the frame path runs; units of the source.

@@ -15,6 +15,12 @@ pub(crate) fn flushed(weight: f32) -> f32 {
     if weight.abs() < FLUSH_BELOW { 0.0 } else { weight }
 }
 
+/// What component `k` counts at a weight.
+pub(crate) fn factor(tier: &Tier<'_>, k: usize, weight: f32) -> f32 {
+    let scaled = (weight * tier.value_scale(k)).clamp(-FACTOR_END, FACTOR_END);
+    if scaled.is_normal() { scaled } else { 0.0 }
+}
+
 /// Buffers of a pose that decode keeps from frame to frame.
 pub(crate) struct Decoded<'p> {
     /// Shape: `[K]`.
@@ -29,8 +35,7 @@ impl Decoded<'_> {
     /// Brings the gradients to `weights` `[K]`, flushed. `all` where the gradients are not those of the pose before.
     pub(crate) fn update(self, tier: &Tier<'_>, kernels: Kernels, weights: &[f32], all: bool) {
         for (k, (share, &weight)) in self.shares.iter_mut().zip(weights).enumerate() {
-            let scaled = (weight * tier.value_scale(k)).clamp(-FACTOR_END, FACTOR_END);
-            let factor = if scaled.is_normal() { scaled } else { 0.0 };
+            let factor = factor(tier, k, weight);
             let changed = u32::from(factor != share.factor);
             *share = Share { factor, changed };
         }

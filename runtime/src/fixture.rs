@@ -9,7 +9,7 @@ use std::vec::Vec;
 use half::f16;
 use sinew_formats::package::{
     AlignedBytes, BakedBasis, BakedBlock, BakedComponent, BakedFast, BakedTier, Fans, FastError, NONE, Patches,
-    write_baked,
+    RenderMesh, write_baked,
 };
 
 use crate::basis::Basis;
@@ -336,6 +336,7 @@ impl Package {
             fans: &fans.fans,
             exact,
             fast: with_fast_tier.then_some(fast),
+            render: RenderMesh::NONE,
         })
         .unwrap();
         let rest_in_source_order = grid.lane_from_vertex.iter().map(|&s| grid.rest[s as usize]).collect();

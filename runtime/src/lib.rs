@@ -8,6 +8,9 @@
 //! A workspace of the fast tier ([`TierChoice`]) runs the same path on a few nodes and lets the vertices follow them: for
 //! crowds and small devices.
 //!
+//! Around it: [`Handles`] and [`Drag`] find the weights that bring held vertices to where they are wanted; [`VertexOutput`]
+//! writes a frame as an engine's vertex buffer; [`Batch`] plays many instances on threads that the caller lends.
+//!
 //! ```no_run
 //! use sinew_runtime::{Basis, Controls, Frame, Workspace, WorkspaceLayout};
 //! # fn play(bytes: &[u8], memory: &mut [u8], weights: &mut [f32], positions: &mut [[f32; 3]], normals: &mut [[f32; 3]])
@@ -23,21 +26,26 @@
 //! # }
 //! ```
 #![no_std]
-// Only the kernels of one instruction set may allow it, each in a file of its own.
+// Only the kernels of one instruction set may allow it, each in a file of its own, and the batch's shared slice.
 #![deny(unsafe_code)]
 
-#[cfg(test)]
+#[cfg(any(test, feature = "std"))]
 extern crate std;
 
 mod basis;
+// Threads need compare-and-swap.
+#[cfg(target_has_atomic = "ptr")]
+mod batch;
 mod controls;
 mod decode;
 mod error;
 mod fast;
 mod frame;
+mod handles;
 pub mod input;
 mod linearize;
 mod normals;
+mod output;
 mod reconstruct;
 mod simd;
 mod solve;
@@ -48,13 +56,17 @@ mod workspace;
 mod fixture;
 
 pub use basis::{Basis, Component};
+#[cfg(target_has_atomic = "ptr")]
+pub use batch::{Batch, Instance};
 pub use controls::Controls;
 pub use error::{Buffer, ControlError, FrameError, WorkspaceError};
 pub use frame::{Frame, FrameOutcome};
+pub use handles::{Drag, DragReport, HANDLES_MAX, HandleError, Handles, HandlesLayout};
 pub use linearize::Tangent;
 pub use normals::Normals;
+pub use output::{Attribute, AttributeName, OutputError, UnitEncoding, VertexLayout, VertexOutput};
 pub use reconstruct::Reconstruct;
 pub use simd::Kernels;
 pub use simd::scalar::surface::{Bounds, FALLBACK_NORMAL};
-pub use sinew_formats::package::{FEATURE_COUNT, FastError, OpenError};
+pub use sinew_formats::package::{FEATURE_COUNT, FastError, OpenError, RenderMesh};
 pub use workspace::{TierChoice, Workspace, WorkspaceLayout};

@@ -16,7 +16,7 @@ use crate::simd::scalar::skin::Map;
 use crate::simd::scalar::surface::Bounds;
 
 /// Start of every buffer: a cache line, and the widest vector register.
-const ALIGNMENT: usize = 64;
+pub(crate) const ALIGNMENT: usize = 64;
 
 /// Which tier of a package a workspace plays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
@@ -128,8 +128,9 @@ impl Sections {
 }
 
 /// Bytes of `count` elements, rounded up so that the next buffer is aligned.
-fn section_bytes<T>(count: usize) -> usize {
-    (count * size_of::<T>()).next_multiple_of(ALIGNMENT)
+pub(crate) fn section_bytes<T>(count: usize) -> usize {
+    let bytes = count.saturating_mul(size_of::<T>()).saturating_add(ALIGNMENT - 1);
+    bytes - bytes % ALIGNMENT
 }
 
 /// The buffers of the frame path. Made once; after that nothing needs memory.
@@ -304,7 +305,7 @@ impl<'w> Workspace<'w> {
 }
 
 /// Splits the first `count` elements off aligned memory.
-fn carve<T: bytemuck::Pod>(memory: &mut [u8], count: usize) -> (&mut [T], &mut [u8]) {
+pub(crate) fn carve<T: bytemuck::Pod>(memory: &mut [u8], count: usize) -> (&mut [T], &mut [u8]) {
     let (section, rest) = memory.split_at_mut(section_bytes::<T>(count));
     let section = &mut section[..count * size_of::<T>()];
     (bytemuck::cast_slice_mut(section), rest)

@@ -15,8 +15,13 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("sinew-formats", &[]),
     ("sinew-runtime", &["sinew-formats"]),
     ("sinew-capi", &["sinew-formats", "sinew-runtime"]),
+    ("sinew-simulator", &["sinew-runtime"]),
     ("sinew-bake", &["sinew-formats"]),
     ("sinew-synthesize", &["sinew-formats"]),
+    (
+        "sinew-stage",
+        &["sinew-formats", "sinew-runtime", "sinew-bake", "sinew-simulator"],
+    ),
     ("sinew-peers", &["sinew-formats", "sinew-bake", "sinew-synthesize"]),
     (
         "sinew-trainer",
@@ -29,8 +34,12 @@ const ARROWS: &[(&str, &[&str])] = &[
     ),
 ];
 
-/// What a crate may use in its tests and benchmarks besides: the runtime's benchmarks play packages baked on the spot.
-const DEVELOPMENT_ARROWS: &[(&str, &[&str])] = &[("sinew-runtime", &["sinew-peers"])];
+/// What a crate may use in its tests and benchmarks besides: the runtime's benchmarks and the simulated box's tests play packages
+/// baked on the spot.
+const DEVELOPMENT_ARROWS: &[(&str, &[&str])] = &[
+    ("sinew-runtime", &["sinew-peers"]),
+    ("sinew-simulator", &["sinew-bake"]),
+];
 
 /// Everything that the runtime links, all of it without std.
 const RUNTIME_CLOSURE: &[&str] = &[
@@ -165,10 +174,10 @@ fn other_targets_lock_the_versions_of_the_workspace() {
             "{folder}: the lock file was read"
         );
         for name in RUNTIME_CLOSURE {
-            if let Some(version) = outside.get(name) {
+            if let Some(version) = outside.get(*name) {
                 assert_eq!(
                     Some(version),
-                    workspace.get(name),
+                    workspace.get(*name),
                     "{folder}/Cargo.lock, {name}: copy the root's Cargo.lock there and build"
                 );
             }

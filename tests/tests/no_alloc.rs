@@ -6,8 +6,9 @@ use std::alloc::System;
 
 use sinew_formats::package::{fixture::tiny_baked, write_baked};
 use sinew_runtime::{
-    Basis, ControlError, Controls, Frame, FrameError, FrameOutcome, Kernels, Normals, OpenError, Reconstruct, Tangent,
-    TierChoice, Workspace, WorkspaceError, WorkspaceLayout,
+    Attribute, Basis, Batch, ControlError, Controls, Drag, Frame, FrameError, FrameOutcome, Handles, HandlesLayout,
+    Instance, Kernels, Normals, OpenError, Reconstruct, Tangent, TierChoice, VertexLayout, VertexOutput, Workspace, WorkspaceError,
+    WorkspaceLayout,
 };
 
 thread_local! {
@@ -223,4 +224,102 @@ fn refusals_allocate_nothing() {
         assert!(short.run(&mut workspace).is_err());
     });
     assert_eq!(count, 0);
+}
+
+#[test]
+fn handles_output_and_batches_allocate_nothing() {
+    const COUNT: usize = sinew_formats::package::fixture::VERTEX_COUNT;
+    const COMPONENTS: usize = sinew_formats::package::fixture::COMPONENT_COUNT;
+    let [bytes, _] = packages();
+    let basis = Basis::open(&bytes).expect("valid");
+    let layout = WorkspaceLayout::for_basis(&basis);
+    let mut memories = [(); 3].map(|()| vec![0; layout.unaligned_bytes()]);
+    let mut handle_memory = vec![0; HandlesLayout::for_basis(&basis, 2).unaligned_bytes()];
+    let mut weights = [[0.0; COMPONENTS]; 3];
+    let mut positions = [[[0.0; 3]; COUNT]; 3];
+    let mut normals = positions;
+    let mut scratch = [[0.0; 4]; 2 * COUNT];
+    let mut buffer = [0; 40 * 2 * COUNT];
+    let mut steps = 0;
+    let count = requests(|| {
+        let [own, one, two] = &mut memories;
+        let [own_weights, one_weights, two_weights] = &mut weights;
+        let [own_positions, one_positions, two_positions] = &mut positions;
+        let [own_normals, one_normals, two_normals] = &mut normals;
+        let mut workspace = Workspace::new(&basis, own).expect("enough memory");
+        let mut controls = Controls::new(&basis, own_weights).expect("one weight a component");
+        assert!(Handles::new(&basis, 2, &mut handle_memory[..9]).is_err());
+        let mut handles = Handles::new(&basis, 2, &mut handle_memory).expect("enough memory");
+        handles.add(&basis, &mut workspace, 4).expect("room");
+        handles.add(&basis, &mut workspace, 7).expect("room");
+        assert!(handles.add(&basis, &mut workspace, 1).is_err());
+        handles.pin(1, true).expect("a component");
+        let at = |offset_bytes| {
+            Some(Attribute {
+                offset_bytes,
+                stride_bytes: 40,
+            })
+        };
+        let vertex_layout = VertexLayout {
+            positions: at(0),
+            normals: at(12),
+            tangents: at(24),
+            ..VertexLayout::default()
+        };
+        for frame in 0..200 {
+            let z = 0.3 * (frame as f32 * 0.1).sin();
+            handles.set_target(4, [1.0, 1.0, z]).expect("finite");
+            assert!(handles.set_target(4, [f32::NAN; 3]).is_err());
+            let drag = Drag {
+                basis: &basis,
+                handles: &mut handles,
+                controls: &mut controls,
+            };
+            steps += drag.run(&mut workspace).expect("finite").step_count;
+            let job = Frame {
+                basis: &basis,
+                controls: &controls,
+                positions: own_positions,
+                normals: Some(own_normals),
+            };
+            job.run(&mut workspace).expect("finite");
+            for length in [buffer.len(), 7] {
+                let output = VertexOutput {
+                    basis: &basis,
+                    positions: own_positions,
+                    normals: Some(own_normals),
+                    scratch: &mut scratch,
+                    layout: vertex_layout,
+                    bytes: &mut buffer[..length],
+                };
+                assert_eq!(output.run().is_ok(), length > 7);
+            }
+        }
+        handles.remove(7).expect("held");
+        handles.clear();
+
+        let instance = |memory, weights, positions, normals| Instance {
+            basis: &basis,
+            controls: Controls::new(&basis, weights).expect("one weight a component"),
+            workspace: Workspace::new(&basis, memory).expect("enough memory"),
+            positions,
+            normals: Some(normals),
+            outcome: None,
+        };
+        let mut instances = [
+            instance(one, one_weights, one_positions, one_normals),
+            instance(two, two_weights, two_positions, two_normals),
+        ];
+        for frame in 0..200 {
+            for instance in &mut instances {
+                instance
+                    .controls
+                    .set(frame % COMPONENTS, 0.01 * frame as f32)
+                    .expect("finite");
+            }
+            assert_eq!(Batch::new(&mut instances).play(), 2);
+        }
+    });
+    assert_eq!(count, 0);
+    assert!(steps > 20, "{steps} steps");
 }

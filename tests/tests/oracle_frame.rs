@@ -13,7 +13,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use sinew_formats::package::{
     BlockRecord, CompactBasis, CompactView, ComponentRecord, FEATURE_COUNT, GraphConvRecord, NONE, Provenance, Quality,
-    write_compact,
+    RenderMesh, write_compact,
 };
 use sinew_runtime::{Basis, Controls, Frame, Workspace, WorkspaceLayout};
 use sinew_trainer::bake::bake;
@@ -189,6 +189,7 @@ impl Compact {
                 steps: 0,
                 steps_run: 0,
             },
+            render: RenderMesh::NONE,
         })?;
         Ok(bytes)
     }

@@ -20,6 +20,7 @@ mod ply_header;
 mod read;
 mod sequence;
 mod text;
+mod texture;
 mod triangulate;
 mod write;
 
@@ -28,8 +29,8 @@ pub use mesh::{MeshKind, PolygonMesh};
 pub use notice::Notice;
 pub use npy::NpyArray;
 pub use read::{SequenceRead, read_sequence};
-pub use sequence::MeshSequence;
+pub use sequence::{MeshSequence, RenderSurface};
 pub use write::{
-    WriteError, write_npy_f32, write_npy_u32, write_npy_vertices, write_obj, write_ply, write_sequence_npy,
-    write_sequence_obj,
+    WriteError, write_npy_f32, write_npy_matrix, write_npy_u32, write_npy_vertices, write_obj, write_ply,
+    write_sequence_npy, write_sequence_obj, write_textured_obj,
 };

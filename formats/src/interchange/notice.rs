@@ -37,6 +37,11 @@ pub enum Notice {
         /// The first of them.
         first: usize,
     },
+    /// The reference has texture coordinates, but a line of them is wrong: the sequence goes without.
+    TextureIgnored {
+        /// The line, from 1.
+        line: usize,
+    },
     /// Vertices that lie exactly on another one in the reference were kept.
     DuplicateVertices {
         /// How many, not counting the one they lie on.
@@ -74,6 +79,13 @@ impl fmt::Display for Notice {
                 write!(
                     f,
                     "{count} vertices belong to no triangle (the first is {first}); they were kept"
+                )
+            }
+            Notice::TextureIgnored { line } => {
+                write!(
+                    f,
+                    "texture coordinates were ignored: the reference's line {line} has one that is no finite number up to \
+                     1e6, or an index of none"
                 )
             }
             Notice::DuplicateVertices { count, first } => {

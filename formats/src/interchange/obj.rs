@@ -1,4 +1,5 @@
 //! Wavefront OBJ, by hand: other readers renumber vertices by their texture coordinates, which a sequence cannot bear.
+//! Those of the reference are read by [`super::texture`].
 
 use super::error::{Place, SequenceError};
 use super::mesh::PolygonMesh;

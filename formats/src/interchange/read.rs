@@ -7,6 +7,7 @@ use super::notice::Notice;
 use super::npy::NpyArray;
 use super::order::{EdgeOrder, diagonal};
 use super::sequence::MeshSequence;
+use super::texture::read_render_surface;
 use super::triangulate::triangulate;
 use std::fs;
 use std::path::Path;
@@ -126,14 +127,14 @@ fn read_files(
         });
     }
     let shape_names: Vec<String> = files.iter().map(|file| file_name(file)).collect();
-    let read_mesh = |file: &Path| {
-        let bytes = fs::read(file).map_err(|source| SequenceError::Io {
+    let read_bytes = |file: &Path| {
+        fs::read(file).map_err(|source| SequenceError::Io {
             path: file.to_path_buf(),
             source,
-        })?;
-        PolygonMesh::parse(kind, &bytes, file)
+        })
     };
-    let reference = read_mesh(first)?;
+    let reference_bytes = read_bytes(first)?;
+    let reference = PolygonMesh::parse(kind, &reference_bytes, first)?;
     let triangulation = triangulate(&reference);
     if triangulation.faces.len() >= u32::MAX as usize {
         let count = triangulation.faces.len();
@@ -158,13 +159,21 @@ fn read_files(
         });
     }
     check_reference(first, &shape_names[0], &triangulation.faces, &reference.positions)?;
+    let mut render = None;
+    if kind == MeshKind::Obj {
+        match read_render_surface(&reference_bytes, &reference, &triangulation.faces) {
+            Ok(surface) => render = surface,
+            Err(line) => notices.push(Notice::TextureIgnored { line }),
+        }
+    }
+    drop(reference_bytes);
     let edge_order = EdgeOrder::new(&triangulation.faces, &reference.positions);
     progress(1, files.len());
 
     let mut shapes = Vec::with_capacity(files.len());
     shapes.push(reference.positions.clone());
     for (m, file) in files.iter().enumerate().skip(1) {
-        let mesh = read_mesh(file)?;
+        let mesh = PolygonMesh::parse(kind, &read_bytes(file)?, file)?;
         check_same_faces(&reference, &mesh, &shape_names[0], file)?;
         if let Some(torn) = edge_order.check(&mesh.positions) {
             return Err(edge_order.refusal(torn, file, m, &shape_names));
@@ -172,7 +181,9 @@ fn read_files(
         shapes.push(mesh.positions);
         progress(m + 1, files.len());
     }
-    Ok(finish(path, triangulation.faces, shapes, shape_names, notices))
+    let mut read = finish(path, triangulation.faces, shapes, shape_names, notices);
+    read.sequence.render = render;
+    Ok(read)
 }
 
 /// `source` is the path that the user gave, `positions` the array file.
@@ -367,6 +378,7 @@ fn finish(
             faces,
             shapes,
             shape_names,
+            render: None,
         },
         notices,
     }

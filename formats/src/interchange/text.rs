@@ -150,6 +150,12 @@ pub(super) fn integer(token: &[u8]) -> Option<i64> {
     core::str::from_utf8(token).ok()?.parse().ok()
 }
 
+/// A finite decimal number.
+pub(super) fn number(token: &[u8]) -> Option<f32> {
+    let number: f32 = core::str::from_utf8(token).ok()?.parse().ok()?;
+    number.is_finite().then_some(number)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -48,6 +48,34 @@ pub fn write_obj(path: &Path, positions: &[[f32; 3]], faces: &[[u32; 3]]) -> Res
     })
 }
 
+/// Writes one shape as OBJ with texture coordinates. Shape: `positions` `[V]`, `faces` `[F]`, `uvs` `[R]`, `uv_faces` `[F]`: the
+/// texture coordinates of each triangle's corners, counted from 0.
+///
+/// Errors: `Io`; `LengthDiffers` unless both kinds of faces are F.
+pub fn write_textured_obj(
+    path: &Path,
+    positions: &[[f32; 3]],
+    faces: &[[u32; 3]],
+    uvs: &[[f32; 2]],
+    uv_faces: &[[u32; 3]],
+) -> Result<(), WriteError> {
+    check_length(path, "texture faces", Some(uv_faces.len()), faces.len())?;
+    write_file(path, |out| {
+        for [x, y, z] in positions {
+            writeln!(out, "v {x} {y} {z}")?;
+        }
+        for [u, v] in uvs {
+            writeln!(out, "vt {u} {v}")?;
+        }
+        for (face, corners) in faces.iter().zip(uv_faces) {
+            let [a, b, c] = face.map(|v| u64::from(v) + 1);
+            let [r, s, t] = corners.map(|r| u64::from(r) + 1);
+            writeln!(out, "f {a}/{r} {b}/{s} {c}/{t}")?;
+        }
+        Ok(())
+    })
+}
+
 /// Writes one shape as binary little-endian PLY. Shape: `positions` and `normals` `[V][3]`, `colors` `[V]` red, green, blue,
 /// `faces` `[F]`.
 ///
@@ -122,6 +150,18 @@ pub fn write_npy_vertices(path: &Path, positions: &[[f32; 3]]) -> Result<(), Wri
     })
 }
 
+/// Writes rows of `columns` numbers as an npy array of f32 `[rows][columns]`. Without columns there are no rows.
+///
+/// Errors: `Io`; `LengthDiffers` if the last row is cut.
+pub fn write_npy_matrix(path: &Path, values: &[f32], columns: usize) -> Result<(), WriteError> {
+    let rows = values.len() / columns.max(1);
+    check_length(path, "the matrix", Some(values.len()), rows * columns)?;
+    write_file(path, |out| {
+        write_npy_header(out, "<f4", &[rows, columns])?;
+        write_f32(out, values)
+    })
+}
+
 /// Writes triangles as an npy array of u32 `[F][3]`.
 ///
 /// Errors: `Io`.
@@ -150,7 +190,11 @@ pub fn write_sequence_npy(folder: &Path, sequence: &MeshSequence) -> Result<(), 
 pub fn write_sequence_obj(folder: &Path, sequence: &MeshSequence) -> Result<(), WriteError> {
     make_folder(folder)?;
     for (m, shape) in sequence.shapes.iter().enumerate() {
-        write_obj(&folder.join(format!("shape_{m:04}.obj")), shape, &sequence.faces)?;
+        let path = folder.join(format!("shape_{m:04}.obj"));
+        match &sequence.render {
+            Some(render) => write_textured_obj(&path, shape, &sequence.faces, &render.uvs, &render.faces)?,
+            None => write_obj(&path, shape, &sequence.faces)?,
+        }
     }
     Ok(())
 }

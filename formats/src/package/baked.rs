@@ -13,7 +13,7 @@ use rkyv::{
     with::{ArchiveWith, InlineAsBox, SerializeWith},
 };
 
-use super::{FAN_VERTICES, FEATURE_COUNT, GROUP_NODES};
+use super::{FAN_VERTICES, FEATURE_COUNT, GROUP_NODES, RenderMesh};
 
 /// Nodes of a block, and rows and columns of a tile.
 pub const TILE_SIDE: usize = 4;
@@ -87,6 +87,8 @@ pub struct BakedBasis<'a> {
     pub exact: BakedTier<'a>,
     /// A tier of fewer nodes, for crowds and small devices.
     pub fast: Option<BakedFast<'a>>,
+    /// What an engine draws.
+    pub render: RenderMesh<'a>,
 }
 
 /// The fast tier: a graph of N nodes stands for the mesh, and each vertex follows four of them. A vertex at rest position r

@@ -4,9 +4,9 @@ use rkyv::{api::low::access, rancor::Failure};
 
 use super::{
     ArchivedBakedBasis, ArchivedBakedFast, ArchivedBakedTier, BakedBlock, BakedComponent, FAN_VERTICES, FEATURE_COUNT,
-    FastError, GROUP_NODES, Header, OpenError, PackageKind, SKIN_NODES, TILE_ENTRIES, TILE_SIDE,
+    FastError, GROUP_NODES, Header, OpenError, PackageKind, RenderMesh, SKIN_NODES, TILE_ENTRIES, TILE_SIDE,
     open::{native, payload},
-    rules,
+    render, rules,
 };
 
 /// An opened baked package; borrows its bytes. Fields mean what [`super::BakedBasis`] says.
@@ -151,6 +151,11 @@ impl<'a> BakedView<'a> {
     /// The tier of fewer nodes, where the package has one.
     pub fn fast(&self) -> Option<FastView<'a>> {
         self.archived.fast.as_ref().map(|archived| FastView { archived })
+    }
+
+    /// What an engine draws; all empty where the source has no texture coordinates.
+    pub fn render_mesh(&self) -> RenderMesh<'a> {
+        render::view(&self.archived.render)
     }
 }
 

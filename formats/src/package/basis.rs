@@ -3,7 +3,7 @@
 
 use rkyv::{Archive, Serialize, with::InlineAsBox};
 
-use super::FEATURE_COUNT;
+use super::{FEATURE_COUNT, RenderMesh};
 
 /// What the trainer learned, small enough to ship: V vertices, F faces, B blocks, K components.
 #[derive(Archive, Serialize, Debug)]
@@ -40,6 +40,8 @@ pub struct CompactBasis<'a> {
     pub provenance: Provenance<'a>,
     /// What the trainer measured.
     pub quality: Quality,
+    /// What an engine draws.
+    pub render: RenderMesh<'a>,
 }
 
 /// One autoencoder block (method section 2): its convolutions, and which components are its latents.

@@ -182,6 +182,11 @@ pub enum OpenError {
         /// Their sum, in units of 1 / 65535.
         sum: u32,
     },
+    /// A triangle of render vertices is not the triangle it should be.
+    RenderFaceDiffers {
+        /// Triangle.
+        face: usize,
+    },
     /// A bit beyond the last vertex is set.
     BitmapTail {
         /// Component.
@@ -324,6 +329,10 @@ impl fmt::Display for OpenError {
             Self::SkinWeightSum { lane, sum } => {
                 write!(out, "the skin weights of lane {lane} sum to {sum} and not to 65535")
             }
+            Self::RenderFaceDiffers { face } => write!(
+                out,
+                "render triangle {face} does not stand for the corners of triangle {face}"
+            ),
             Self::BitmapTail { component } => {
                 write!(
                     out,

@@ -8,10 +8,16 @@ use alloc::vec::Vec;
 
 use half::f16;
 
+mod fast;
+mod render;
+
+pub use fast::TinyFast;
+pub use render::TinyRender;
+
 use super::{
-    BakedBasis, BakedBlock, BakedComponent, BakedFast, BakedTier, BlockRecord, CompactBasis, ComponentRecord,
-    FAN_VERTICES, FEATURE_COUNT, Fans, FastError, GraphConvRecord, Header, NONE, PackageKind, Patch, Patches,
-    Provenance, Quality, SKIN_NODES, TILE_ENTRIES, TILE_SIDE, write_compact,
+    BakedBasis, BakedBlock, BakedComponent, BakedTier, BlockRecord, CompactBasis, ComponentRecord, FAN_VERTICES,
+    FEATURE_COUNT, Fans, GraphConvRecord, Header, NONE, PackageKind, Patch, Patches, Provenance, Quality, TILE_ENTRIES,
+    TILE_SIDE, write_compact,
 };
 
 /// V of the grid.
@@ -39,6 +45,7 @@ pub struct TinyCompact {
     pub values: Vec<[u16; FEATURE_COUNT]>,
     pub provenance: Provenance<'static>,
     pub quality: Quality,
+    pub render: TinyRender,
 }
 
 /// Owns what a [`BakedBasis`] borrows; a test changes a field and writes.
@@ -57,17 +64,7 @@ pub struct TinyBaked {
     pub fans: Vec<[u32; FAN_VERTICES]>,
     pub exact: TinyTier,
     pub fast: Option<TinyFast>,
-}
-
-/// Owns what a [`BakedFast`] borrows.
-#[derive(Debug, Clone)]
-#[expect(missing_docs, reason = "fields are those of BakedFast")]
-pub struct TinyFast {
-    pub nodes: TinyTier,
-    pub centre: [f32; 3],
-    pub skin_nodes: Vec<[u16; SKIN_NODES]>,
-    pub skin_weights: Vec<[u16; SKIN_NODES]>,
-    pub error: FastError,
+    pub render: TinyRender,
 }
 
 /// Owns what a [`BakedTier`] borrows.
@@ -105,6 +102,7 @@ impl TinyCompact {
             values: &self.values,
             provenance: self.provenance,
             quality: self.quality,
+            render: self.render.mesh(),
         }
     }
 }
@@ -125,37 +123,7 @@ impl TinyBaked {
             fans: &self.fans,
             exact: self.exact.tier(),
             fast: self.fast.as_ref().map(TinyFast::fast),
-        }
-    }
-
-    /// A fast tier that is the exact one over again: every vertex is a node and follows itself, so both play the same.
-    pub fn own_nodes(&self) -> TinyFast {
-        TinyFast {
-            nodes: self.exact.clone(),
-            centre: [0.25, 0.5, 0.0],
-            skin_nodes: (0..VERTEX_COUNT as u16).map(|lane| [lane; SKIN_NODES]).collect(),
-            skin_weights: alloc::vec![[16_384, 16_384, 16_384, 16_383]; VERTEX_COUNT],
-            error: FastError {
-                mixed_rms: 1e-6,
-                mixed_p99: 2e-6,
-                mixed_max: 4e-6,
-                single_rms: 0.5e-6,
-                single_max: 3e-6,
-                normal_rms: 1e-5,
-                mixed_poses: 64,
-            },
-        }
-    }
-}
-
-impl TinyFast {
-    fn fast(&self) -> BakedFast<'_> {
-        BakedFast {
-            nodes: self.nodes.tier(),
-            centre: self.centre,
-            skin_nodes: &self.skin_nodes,
-            skin_weights: &self.skin_weights,
-            error: self.error,
+            render: self.render.mesh(),
         }
     }
 }
@@ -243,6 +211,7 @@ pub fn tiny_compact() -> TinyCompact {
             steps: 30,
             steps_run: 40,
         },
+        render: TinyRender::with_seam(&rest_positions(), &faces()),
     }
 }
 
@@ -285,6 +254,7 @@ pub fn tiny_baked() -> TinyBaked {
         fans: fans.fans,
         exact,
         fast: None,
+        render: compact.render.clone(),
     }
 }
 

@@ -33,6 +33,11 @@ pub const CONFIG_BYTES: usize = 1 << 20;
 /// Bytes of a payload: its 32-bit relative pointers reach no further.
 pub const PAYLOAD_BYTES: u64 = i32::MAX as u64;
 
+/// Render vertices: a vertex has as many as texture coordinates.
+pub const RENDER_VERTICES: usize = 16 << 20;
+/// Texture coordinate, either sign.
+pub const TEXTURE: f32 = 1e6;
+
 /// Coordinate of a rest position, either sign, units of the source.
 pub const POSITION: f32 = 1e9;
 /// Weight of a control, either sign.

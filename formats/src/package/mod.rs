@@ -16,6 +16,7 @@ pub mod limits;
 mod open;
 #[cfg(feature = "alloc")]
 mod patches;
+mod render;
 mod rules;
 #[cfg(all(test, feature = "alloc"))]
 mod tests;
@@ -41,6 +42,7 @@ pub use header::{FIRST_VERSION, FORMAT_VERSION, HEADER_BYTES, Header, MAGIC, PAY
 pub use open::{CompactEntry, CompactView};
 #[cfg(feature = "alloc")]
 pub use patches::{Patch, Patches};
+pub use render::{ArchivedRenderMesh, RenderMesh};
 #[cfg(feature = "alloc")]
 pub use write::{AlignedBytes, WriteError, write_baked, write_compact};
 

@@ -5,7 +5,7 @@ use rkyv::{api::low::access, boxed::ArchivedBox, rancor::Failure};
 
 use super::{
     ArchivedBlockRecord, ArchivedCompactBasis, ArchivedGraphConvRecord, BlockRecord, ComponentRecord, FEATURE_COUNT,
-    GraphConvRecord, Header, OpenError, PackageKind, Provenance, Quality, rules,
+    GraphConvRecord, Header, OpenError, PackageKind, Provenance, Quality, RenderMesh, render, rules,
 };
 
 #[cfg(target_endian = "big")]
@@ -191,6 +191,11 @@ impl<'a> CompactView<'a> {
             steps: self.archived.quality.steps.to_native(),
             steps_run: self.archived.quality.steps_run.to_native(),
         }
+    }
+
+    /// What an engine draws; all empty where the source has no texture coordinates.
+    pub fn render_mesh(&self) -> RenderMesh<'a> {
+        render::view(&self.archived.render)
     }
 }
 

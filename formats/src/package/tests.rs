@@ -22,6 +22,11 @@ fn a_compact_package_is_read_as_written() {
     assert_eq!(view.values(), tiny.values);
     assert_eq!(view.provenance(), tiny.provenance);
     assert_eq!(view.quality(), tiny.quality);
+    assert_eq!(view.render_mesh(), tiny.basis().render);
+    assert!(
+        view.render_mesh().vertices.len() > view.vertex_count(),
+        "the seam is torn"
+    );
     let places: Vec<_> = view.entries().map(|entry| (entry.component, entry.vertex)).collect();
     assert_eq!(places[..7], [(0, 0), (0, 1), (0, 2), (0, 3), (0, 4), (0, 5), (1, 3)]);
     assert!(view.entries().map(|entry| *entry.values).eq(tiny.values));
@@ -44,6 +49,7 @@ fn a_baked_package_is_read_as_written() {
     assert_eq!(view.fans(), tiny.fans);
     tier_is_read_as_written(&view.exact(), &tiny.exact);
     assert!(view.fast().is_none());
+    assert_eq!(view.render_mesh(), tiny.basis().render);
 }
 
 fn tier_is_read_as_written(view: &TierView<'_>, tiny: &TinyTier) {
@@ -181,9 +187,10 @@ fn records_lie_as_documented() {
         values,
         provenance,
         quality,
+        render,
     });
-    assert_eq!(compact, [0, 8, 16, 24, 28, 32, 36, 44, 52, 60, 72, 120]);
-    assert_eq!((size_of::<Compact>(), align_of::<Compact>()), (136, 8));
+    assert_eq!(compact, [0, 8, 16, 24, 28, 32, 36, 44, 52, 60, 72, 120, 132]);
+    assert_eq!((size_of::<Compact>(), align_of::<Compact>()), (160, 8));
     let block = places!(ArchivedBlockRecord {
         level,
         parent_component,
@@ -237,9 +244,10 @@ fn records_lie_as_documented() {
         fans,
         exact,
         fast,
+        render,
     });
-    assert_eq!(baked, [0, 16, 24, 32, 40, 44, 48, 56, 64, 72, 80, 184]);
-    assert_eq!((size_of::<Baked>(), align_of::<Baked>()), (348, 4));
+    assert_eq!(baked, [0, 16, 24, 32, 40, 44, 48, 56, 64, 72, 80, 184, 348]);
+    assert_eq!((size_of::<Baked>(), align_of::<Baked>()), (372, 4));
     let fast = places!(ArchivedBakedFast<'static> { nodes, centre, skin_nodes, skin_weights, error });
     assert_eq!(fast, [0, 104, 116, 124, 132]);
     assert_eq!(size_of::<ArchivedBakedFast<'static>>(), 160);
@@ -254,6 +262,9 @@ fn records_lie_as_documented() {
     });
     assert_eq!(error, [0, 4, 8, 12, 16, 20, 24]);
     assert_eq!(size_of::<ArchivedFastError>(), 28);
+    type Render = ArchivedRenderMesh<'static>;
+    assert_eq!(places!(Render { vertices, uvs, faces }), [0, 8, 16]);
+    assert_eq!((size_of::<Render>(), align_of::<Render>()), (24, 4));
     let tier = places!(Tier {
         rest_positions,
         ring_offsets,

@@ -117,18 +117,19 @@ fn solve_path<'c>(basis: &'c Basis<'c>, kernels: Kernels) -> Contender<'c> {
 
 fn normals<'c>(basis: &'c Basis<'c>) -> Contender<'c> {
     let positions: Vec<[f32; 3]> = basis
-        .solver_from_vertex()
+        .lane_from_vertex()
         .iter()
-        .map(|&s| basis.rest_positions()[s as usize])
+        .map(|&lane| basis.rest_positions()[lane as usize])
         .collect();
     let mut normals = positions.clone();
+    let mut workspace = workspace(basis, Kernels::detect());
     let run = move |_| {
         let job = Normals {
             basis,
             positions: &positions,
             normals: &mut normals,
         };
-        job.run().expect("lengths agree");
+        job.run(&mut workspace).expect("lengths agree");
     };
     Contender {
         name: "normals alone".into(),

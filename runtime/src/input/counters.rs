@@ -135,6 +135,85 @@ pub enum Fault {
     Undecided,
 }
 
+impl Fault {
+    /// A number for it, never 0, for [`super::SourceStatus::last_bad`] and for C: the kind in the low byte, the version or
+    /// the count of missing frames in the high one. Numbers do not change.
+    pub const fn code(self) -> u16 {
+        match self {
+            Self::NotText => 1,
+            Self::NotNumbers => 2,
+            Self::EmptyField => 3,
+            Self::NumberTooLarge => 4,
+            Self::Negative => 5,
+            Self::DecimalTooLarge => 6,
+            Self::MixedLabels => 7,
+            Self::LabelsChanged => 8,
+            Self::TooManyFields => 9,
+            Self::LineTooLong => 10,
+            Self::FrameTooLong => 11,
+            Self::BrokenStuffing => 12,
+            Self::FrameTooShort => 13,
+            Self::WrongChecksum => 14,
+            Self::UnknownVersion { version } => 15 | (version as u16) << 8,
+            Self::WrongLength => 16,
+            Self::ValueAboveFullScale => 17,
+            Self::BadName => 18,
+            Self::SequenceGap { missing } => 19 | (missing as u16) << 8,
+            Self::StrayData => 20,
+            Self::CutMessage => 21,
+            Self::BadReport => 22,
+            Self::NotOsc => 23,
+            Self::OscCutShort => 24,
+            Self::OscBadAddress => 25,
+            Self::OscBadTypes => 26,
+            Self::OscTooDeep => 27,
+            Self::NotFinite => 28,
+            Self::OutOfRange => 29,
+            Self::Undecided => 30,
+        }
+    }
+
+    /// The fault of a number; `None` for 0 and for numbers that no fault has.
+    pub const fn from_code(code: u16) -> Option<Self> {
+        let [kind, detail] = code.to_le_bytes();
+        let fault = match kind {
+            1 => Self::NotText,
+            2 => Self::NotNumbers,
+            3 => Self::EmptyField,
+            4 => Self::NumberTooLarge,
+            5 => Self::Negative,
+            6 => Self::DecimalTooLarge,
+            7 => Self::MixedLabels,
+            8 => Self::LabelsChanged,
+            9 => Self::TooManyFields,
+            10 => Self::LineTooLong,
+            11 => Self::FrameTooLong,
+            12 => Self::BrokenStuffing,
+            13 => Self::FrameTooShort,
+            14 => Self::WrongChecksum,
+            15 => Self::UnknownVersion { version: detail },
+            16 => Self::WrongLength,
+            17 => Self::ValueAboveFullScale,
+            18 => Self::BadName,
+            19 => Self::SequenceGap { missing: detail },
+            20 => Self::StrayData,
+            21 => Self::CutMessage,
+            22 => Self::BadReport,
+            23 => Self::NotOsc,
+            24 => Self::OscCutShort,
+            25 => Self::OscBadAddress,
+            26 => Self::OscBadTypes,
+            27 => Self::OscTooDeep,
+            28 => Self::NotFinite,
+            29 => Self::OutOfRange,
+            30 => Self::Undecided,
+            _ => return None,
+        };
+        // A detail where the kind has none is no number of ours.
+        if fault.code() == code { Some(fault) } else { None }
+    }
+}
+
 impl fmt::Display for Fault {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         out.write_str(match *self {
@@ -175,3 +254,20 @@ impl fmt::Display for Fault {
 }
 
 impl core::error::Error for Fault {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_code_names_its_fault() {
+        let known = (0..=u16::MAX).filter_map(|code| Some((code, Fault::from_code(code)?)));
+        let mut count = 0;
+        for (code, fault) in known {
+            assert_eq!(fault.code(), code);
+            count += 1;
+        }
+        assert_eq!(count, 30 - 2 + 2 * 256, "two kinds have a detail of one byte");
+        assert_eq!(Fault::from_code(0), None);
+    }
+}

@@ -7,15 +7,16 @@
 
 use sinew_formats::package::{FEATURE_COUNT, GROUP_NODES};
 
+pub(crate) use super::adjoint::{derivatives, held};
 use super::functions::{half_angle, tanh};
 use super::lanes::{Gradient, Lanes};
 
 /// Nine numbers of each vertex of a group, number first.
 pub(crate) type Group<T> = [[T; GROUP_NODES]; FEATURE_COUNT];
 /// Nine vectors.
-type Row<L> = [L; FEATURE_COUNT];
+pub(super) type Row<L> = [L; FEATURE_COUNT];
 /// Row-major 3x3 of vectors.
-type Matrix<L> = [[L; 3]; 3];
+pub(super) type Matrix<L> = [[L; 3]; 3];
 
 /// The components, by groups of vertices: G groups, T patches.
 #[derive(Clone, Copy, Debug)]
@@ -151,14 +152,14 @@ pub(crate) fn tangents<L: Lanes>(decoder: &Decoder<'_>, k: usize, scale: f32, gr
 impl Patches<'_> {
     /// The patches of a group.
     #[inline(always)]
-    fn of(&self, g: usize) -> core::ops::Range<usize> {
+    pub(super) fn of(&self, g: usize) -> core::ops::Range<usize> {
         self.offsets[g] as usize..self.offsets[g + 1] as usize
     }
 }
 
 /// Features: the sum over the blocks of `tanh(bias + sum_k z_k C_k) - tanh(bias)`, from one lane on.
 #[inline(always)]
-fn blend<L: Lanes>(decoder: &Decoder<'_>, patches: core::ops::Range<usize>, lane: usize) -> Row<L> {
+pub(super) fn blend<L: Lanes>(decoder: &Decoder<'_>, patches: core::ops::Range<usize>, lane: usize) -> Row<L> {
     let mut x = [L::splat(0.0); FEATURE_COUNT];
     let mut t = patches.start;
     while t < patches.end {
@@ -181,7 +182,11 @@ fn blend<L: Lanes>(decoder: &Decoder<'_>, patches: core::ops::Range<usize>, lane
 
 /// `bias + sum_k z_k C_k` of the block that the first patch belongs to, and where its patches end.
 #[inline(always)]
-fn block_blend<L: Lanes>(decoder: &Decoder<'_>, patches: core::ops::Range<usize>, lane: usize) -> (Row<L>, usize) {
+pub(super) fn block_blend<L: Lanes>(
+    decoder: &Decoder<'_>,
+    patches: core::ops::Range<usize>,
+    lane: usize,
+) -> (Row<L>, usize) {
     let owners = &decoder.patches.owners[patches.clone()];
     let values = &decoder.patches.values[patches.clone()];
     let b = owners[0][1];
@@ -205,7 +210,7 @@ fn block_blend<L: Lanes>(decoder: &Decoder<'_>, patches: core::ops::Range<usize>
 
 /// `D = exp([r]x) S - I` by rows.
 #[inline(always)]
-fn gradient<L: Lanes>(scales: FeatureScales, x: &Row<L>) -> Row<L> {
+pub(super) fn gradient<L: Lanes>(scales: FeatureScales, x: &Row<L>) -> Row<L> {
     let e = rotation_less_identity(&log_rotation(scales, x)).0;
     let p = stretch_less_identity(scales, x);
     // (I + E)(I + P) - I = E + P + E P: no difference of near-equal numbers.
@@ -236,17 +241,7 @@ fn gradient_tangent<L: Lanes>(scales: FeatureScales, x: &Row<L>, dx: &Row<L>) ->
 /// `J_l = a I + b [r]x + c r r^T` with `a = sin t / t`, `b = (1 - cos t) / t^2` and `c = (t - sin t) / t^3`.
 #[inline(always)]
 fn left_jacobian<L: Lanes>(r: &[L; 3], dr: &[L; 3], turn: &HalfTurn<L>) -> [L; 3] {
-    /// Below this squared angle a series: the closed form cancels.
-    const SERIES_ANGLE_SQUARED: f32 = 1.0;
-    let twice = turn.sine.add(turn.sine);
-    let (a, b) = (twice.mul(turn.cosine), twice.mul(turn.sine));
-    let t = turn.angle_squared;
-    let series = [1.0 / 362_880.0, -1.0 / 5040.0, 1.0 / 120.0, -1.0 / 6.0];
-    let series = series
-        .into_iter()
-        .fold(L::splat(0.0), |sum, term| sum.mul_add(t, L::splat(term)));
-    let closed = L::splat(1.0).sub(a).div(t);
-    let c = t.select_below(L::splat(SERIES_ANGLE_SQUARED), L::splat(0.0).sub(series), closed);
+    let [a, b, c] = turn.jacobian();
     let along = c.mul(dot(r, dr));
     core::array::from_fn(|i| {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);
@@ -255,14 +250,33 @@ fn left_jacobian<L: Lanes>(r: &[L; 3], dr: &[L; 3], turn: &HalfTurn<L>) -> [L; 3
     })
 }
 
+impl<L: Lanes> HalfTurn<L> {
+    /// a, b and c of [`left_jacobian`].
+    #[inline(always)]
+    pub(super) fn jacobian(&self) -> [L; 3] {
+        /// Below this squared angle a series: the closed form cancels.
+        const SERIES_ANGLE_SQUARED: f32 = 1.0;
+        let twice = self.sine.add(self.sine);
+        let (a, b) = (twice.mul(self.cosine), twice.mul(self.sine));
+        let t = self.angle_squared;
+        let series = [1.0 / 362_880.0, -1.0 / 5040.0, 1.0 / 120.0, -1.0 / 6.0];
+        let series = series
+            .into_iter()
+            .fold(L::splat(0.0), |sum, term| sum.mul_add(t, L::splat(term)));
+        let closed = L::splat(1.0).sub(a).div(t);
+        let c = t.select_below(L::splat(SERIES_ANGLE_SQUARED), L::splat(0.0).sub(series), closed);
+        [a, b, c]
+    }
+}
+
 /// One entry of `A B`.
 #[inline(always)]
-fn product<L: Lanes>(a: &Matrix<L>, b: &Matrix<L>, i: usize, j: usize) -> L {
+pub(super) fn product<L: Lanes>(a: &Matrix<L>, b: &Matrix<L>, i: usize, j: usize) -> L {
     a[i][2].mul_add(b[2][j], a[i][1].mul_add(b[1][j], a[i][0].mul(b[0][j])))
 }
 
 #[inline(always)]
-fn plus_identity<L: Lanes>(mut a: Matrix<L>) -> Matrix<L> {
+pub(super) fn plus_identity<L: Lanes>(mut a: Matrix<L>) -> Matrix<L> {
     for i in 0..3 {
         a[i][i] = a[i][i].add(L::splat(1.0));
     }
@@ -270,19 +284,19 @@ fn plus_identity<L: Lanes>(mut a: Matrix<L>) -> Matrix<L> {
 }
 
 #[inline(always)]
-fn log_rotation<L: Lanes>(scales: FeatureScales, x: &Row<L>) -> [L; 3] {
+pub(super) fn log_rotation<L: Lanes>(scales: FeatureScales, x: &Row<L>) -> [L; 3] {
     core::array::from_fn(|c| L::splat(scales.rotation).mul(x[c]))
 }
 
 /// `S - I`.
 #[inline(always)]
-fn stretch_less_identity<L: Lanes>(scales: FeatureScales, x: &Row<L>) -> Matrix<L> {
+pub(super) fn stretch_less_identity<L: Lanes>(scales: FeatureScales, x: &Row<L>) -> Matrix<L> {
     let s: [L; 6] = core::array::from_fn(|c| L::splat(scales.stretch).mul(x[3 + c]));
     [[s[0], s[1], s[2]], [s[1], s[3], s[4]], [s[2], s[4], s[5]]]
 }
 
 /// What Rodrigues' formula knows besides the matrix.
-struct HalfTurn<L> {
+pub(super) struct HalfTurn<L> {
     /// `|r|^2`.
     angle_squared: L,
     /// `sin(|r| / 2) / |r|`, up to the sign that it shares with `cosine`.
@@ -293,7 +307,7 @@ struct HalfTurn<L> {
 
 /// `exp([r]x) - I = 2 w [v]x + 2 [v]x^2` with the quaternion `(w, v)` of the rotation: squares and products only.
 #[inline(always)]
-fn rotation_less_identity<L: Lanes>(r: &[L; 3]) -> (Matrix<L>, HalfTurn<L>) {
+pub(super) fn rotation_less_identity<L: Lanes>(r: &[L; 3]) -> (Matrix<L>, HalfTurn<L>) {
     let angle_squared = dot(r, r);
     let [sine, cosine] = half_angle(angle_squared.sqrt());
     let v = r.map(|x| x.mul(sine));
@@ -317,7 +331,7 @@ fn rotation_less_identity<L: Lanes>(r: &[L; 3]) -> (Matrix<L>, HalfTurn<L>) {
 }
 
 #[inline(always)]
-fn dot<L: Lanes>(a: &[L; 3], b: &[L; 3]) -> L {
+pub(super) fn dot<L: Lanes>(a: &[L; 3], b: &[L; 3]) -> L {
     a[2].mul_add(b[2], a[1].mul_add(b[1], a[0].mul(b[0])))
 }
 

@@ -3,6 +3,7 @@
 //! [`scalar`] is the reference; every other kernel equals it within a named tolerance. Which ones run is decided once, when
 //! a workspace is made: by what the processor says on x86-64, at compile time elsewhere.
 
+pub(crate) mod adjoint;
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod avx2;
 #[cfg(target_arch = "x86_64")]
@@ -12,6 +13,7 @@ mod functions;
 pub(crate) mod lanes;
 pub(crate) mod scalar;
 
+use adjoint::{HeldSums, Pull};
 #[cfg(test)]
 mod poisson_tests;
 #[cfg(test)]
@@ -52,6 +54,8 @@ impl Kernels {
     dispatch!(decode(decoder: &Decoder<'_>, gradients: &mut [Gradient]));
     dispatch!(features(decoder: &Decoder<'_>, g: usize, features: &mut Group<f32>));
     dispatch!(gradients(scales: FeatureScales, features: &Group<f32>, gradients: &mut [Gradient]));
+    dispatch!(held(decoder: &Decoder<'_>, pulls: &[Pull], features: &mut [Group<f32>], sums: &mut [HeldSums]));
+    dispatch!(derivatives(decoder: &Decoder<'_>, pulls: &[Pull], features: &[Group<f32>], sums: &mut [HeldSums]));
     dispatch!(tangents(decoder: &Decoder<'_>, k: usize, scale: f32, gradients: &mut [Gradient]));
 }
 

@@ -35,7 +35,7 @@ impl Case {
     fn new(vertex_count: usize, far: f32) -> Self {
         let mut noise = Noise::new(11);
         let centre = [far, -far, 0.5 * far];
-        let mut near = |noise: &mut Noise| core::array::from_fn(|c| centre[c] + noise.next());
+        let near = |noise: &mut Noise| core::array::from_fn(|c| centre[c] + noise.next());
         let with_zero = |[x, y, z]: [f32; 3]| [x, y, z, 0.0];
         let unit = |noise: &mut Noise| 0.5 + 0.5 * noise.next();
         Self {

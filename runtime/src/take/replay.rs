@@ -25,17 +25,16 @@ pub fn replay(
     controls: &mut Controls<'_>,
     mut frame: impl FnMut(u64, &[f32]),
 ) -> Result<Replayed, SurfaceError> {
-    let mut replayed = Replayed::default();
-    for stamped in take.records() {
-        if stamped.record == Record::Frame {
-            surface.advance(stamped.at_us, controls)?;
-            frame(stamped.at_us, controls.weights());
-            replayed.frames += 1;
-        } else if !apply(take, stamped, surface, controls) {
-            replayed.skipped += 1;
-        }
+    let mut frames = TakeFrames::recorded(take);
+    let mut count = 0;
+    while let Some(at_us) = frames.next_frame(surface, controls)? {
+        frame(at_us, controls.weights());
+        count += 1;
     }
-    Ok(replayed)
+    Ok(Replayed {
+        frames: count,
+        skipped: frames.skipped(),
+    })
 }
 
 /// Applies a record that is no frame; false if it does not fit this basis.
@@ -57,33 +56,45 @@ fn apply(take: &Take<'_>, stamped: Stamped, surface: &mut ControlSurface<'_>, co
     true
 }
 
-/// A take at frames of one's own: for export. One call a frame, so that a caller can stop a take whose times make no sense.
+/// A take frame by frame: at the frames that were played, or at others. One call a frame, so that a caller can pace a take, or
+/// stop one whose times make no sense.
 #[derive(Debug)]
 pub struct TakeFrames<'a> {
     take: Take<'a>,
     records: Records<'a>,
     pending: Option<Stamped>,
-    frame_us: u64,
+    /// `None`: the frames of the take.
+    frame_us: Option<u64>,
     next_us: Option<u64>,
     skipped: usize,
 }
 
 impl<'a> TakeFrames<'a> {
-    /// Frames every `frame_us` from the first record on; 0 counts as 1.
+    /// Frames every `frame_us` from the first record on; 0 counts as 1. For export.
     pub fn new(take: &Take<'a>, frame_us: u64) -> Self {
+        Self::start(take, Some(frame_us.max(1)))
+    }
+
+    /// The frames that were played: see [`replay`].
+    pub fn recorded(take: &Take<'a>) -> Self {
+        Self::start(take, None)
+    }
+
+    fn start(take: &Take<'a>, frame_us: Option<u64>) -> Self {
         let mut records = take.records();
         let pending = records.next();
         Self {
             take: *take,
             records,
             pending,
-            frame_us: frame_us.max(1),
+            frame_us,
             next_us: pending.map(|first| first.at_us),
             skipped: 0,
         }
     }
 
-    /// The next frame: its time, with the controls moved on to it; `None` after the frame that follows the last record.
+    /// The next frame: its time, with the controls moved on to it. `None` after the last frame that was played, or after the
+    /// frame of one's own that follows the last record.
     ///
     /// # Errors
     /// [`SurfaceError`].
@@ -92,14 +103,33 @@ impl<'a> TakeFrames<'a> {
         surface: &mut ControlSurface<'_>,
         controls: &mut Controls<'_>,
     ) -> Result<Option<u64>, SurfaceError> {
+        let Some(frame_us) = self.frame_us else {
+            return self.next_recorded(surface, controls);
+        };
         let Some(now_us) = self.next_us else { return Ok(None) };
         while let Some(stamped) = self.pending.filter(|stamped| stamped.at_us <= now_us) {
             self.skipped += usize::from(!apply(&self.take, stamped, surface, controls));
             self.pending = self.records.next();
         }
         surface.advance(now_us, controls)?;
-        self.next_us = self.pending.and_then(|_| now_us.checked_add(self.frame_us));
+        self.next_us = self.pending.and_then(|_| now_us.checked_add(frame_us));
         Ok(Some(now_us))
+    }
+
+    fn next_recorded(
+        &mut self,
+        surface: &mut ControlSurface<'_>,
+        controls: &mut Controls<'_>,
+    ) -> Result<Option<u64>, SurfaceError> {
+        while let Some(stamped) = self.pending {
+            self.pending = self.records.next();
+            if stamped.record == Record::Frame {
+                surface.advance(stamped.at_us, controls)?;
+                return Ok(Some(stamped.at_us));
+            }
+            self.skipped += usize::from(!apply(&self.take, stamped, surface, controls));
+        }
+        Ok(None)
     }
 
     /// Records left out so far; see [`Replayed::skipped`].

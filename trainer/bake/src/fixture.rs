@@ -6,7 +6,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use sinew_formats::package::{
     AlignedBytes, BlockRecord, CompactBasis, ComponentRecord, FEATURE_COUNT, GraphConvRecord, NONE, Provenance,
-    Quality, write_compact,
+    Quality, RenderMesh, write_compact,
 };
 
 use crate::mesh::topology::Topology;
@@ -111,6 +111,14 @@ pub fn compact(seed: u64, identity: bool) -> AlignedBytes {
             value_scale: 0.3,
         });
     }
+    // The first triangle has a texture of its own.
+    let all: Vec<u32> = (0..vertex_count as u32).chain(faces[0]).collect();
+    let uvs: Vec<[f32; 2]> = all
+        .iter()
+        .map(|&v| [rest[v as usize][0], rest[v as usize][1]])
+        .collect();
+    let mut render_faces = faces.clone();
+    render_faces[0] = [0, 1, 2].map(|corner| vertex_count as u32 + corner);
     let bytes = write_compact(&CompactBasis {
         rest_positions: &rest,
         faces: &faces,
@@ -134,6 +142,11 @@ pub fn compact(seed: u64, identity: bool) -> AlignedBytes {
             validation_e_rms: -1.0,
             steps: 0,
             steps_run: 0,
+        },
+        render: RenderMesh {
+            vertices: &all,
+            uvs: &uvs,
+            faces: &render_faces,
         },
     });
     bytes.expect("the fixture keeps the format's rules")

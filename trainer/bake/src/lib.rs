@@ -183,6 +183,7 @@ pub fn bake_with(package: &CompactView<'_>, options: &BakeOptions) -> Result<Ali
         fans: &fans.fans,
         exact: exact.record(),
         fast: fast.as_ref().map(Fast::record),
+        render: package.render_mesh(),
     })
     .map_err(BakeError::Refused)
 }

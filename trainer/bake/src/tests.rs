@@ -124,3 +124,13 @@ fn node_counts_are_read_as_they_are_written() {
         assert_eq!(wrong.parse::<FastNodes>(), Err(FastNodesError), "{wrong}");
     }
 }
+
+#[test]
+fn render_vertices_are_passed_on() {
+    let compact = fixture::compact(1, false);
+    let compact = CompactView::open(&compact).unwrap();
+    let baked = bake(&compact).unwrap();
+    let baked = BakedView::open(&baked).unwrap();
+    assert!(baked.render_mesh().vertices.len() > baked.vertex_count());
+    assert_eq!(baked.render_mesh(), compact.render_mesh());
+}

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
-use sinew_formats::interchange::{write_npy_vertices, write_obj, write_ply};
+use sinew_formats::interchange::{write_npy_vertices, write_obj, write_ply, write_textured_obj};
 use sinew_formats::package::{AlignedBytes, PackageKind};
 use sinew_runtime::{Basis, Controls, Frame, Workspace, WorkspaceLayout};
 use sinew_trainer::bake::bake_bytes;
@@ -28,7 +28,7 @@ pub struct FrameArguments {
     /// A control and its weight; may be repeated
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = parse_setting, allow_hyphen_values = true)]
     settings: Vec<(String, f32)>,
-    /// Mesh to write: .obj, .ply (with normals) or .npy (positions alone)
+    /// Mesh to write: .obj (with texture coordinates where the package has some), .ply (with normals) or .npy (positions alone)
     #[arg(long, short, value_name = "FILE")]
     output: PathBuf,
 }
@@ -106,7 +106,14 @@ pub fn run(arguments: &FrameArguments, console: &Console) -> Result<(), Failure>
     .into_diagnostic()
     .wrap_err("the pose cannot be played")?;
     let written = match extension.as_str() {
-        "obj" => write_obj(&arguments.output, &positions, basis.faces()),
+        "obj" => {
+            let (output, faces, render) = (&arguments.output, basis.faces(), basis.render_mesh());
+            if render.vertices.is_empty() {
+                write_obj(output, &positions, faces)
+            } else {
+                write_textured_obj(output, &positions, faces, render.uvs, render.faces)
+            }
+        }
         "ply" => write_ply(&arguments.output, &positions, basis.faces(), Some(&normals), None),
         _ => write_npy_vertices(&arguments.output, &positions),
     };

@@ -3,7 +3,8 @@
 
 use half::f16;
 use serde::{Deserialize, Serialize};
-use sinew_formats::package::{BlockRecord, CompactBasis, ComponentRecord, NONE, Provenance, Quality};
+use sinew_formats::interchange::RenderSurface;
+use sinew_formats::package::{BlockRecord, CompactBasis, ComponentRecord, NONE, Provenance, Quality, RenderMesh};
 
 use crate::network::weights::StackWeights;
 
@@ -85,6 +86,8 @@ pub struct LearnedBasis {
     pub rotation_scale: f32,
     /// See [`CompactBasis`].
     pub stretch_scale: f32,
+    /// Texture coordinates, where the reference has some.
+    pub render: Option<RenderSurface>,
     /// Parents before children, level by level.
     pub blocks: Vec<LearnedBlock>,
 }
@@ -103,6 +106,8 @@ pub struct BasisFrame {
     pub rotation_scale: f32,
     /// See [`CompactBasis`].
     pub stretch_scale: f32,
+    /// Texture coordinates, where the reference has some.
+    pub render: Option<RenderSurface>,
 }
 
 impl LearnedBasis {
@@ -166,6 +171,7 @@ impl LearnedBasis {
             anchor_vertex: frame.anchor_vertex,
             rotation_scale: frame.rotation_scale,
             stretch_scale: frame.stretch_scale,
+            render: frame.render,
             blocks,
         }
     }
@@ -332,6 +338,11 @@ impl LearnedBasis {
             values: &values,
             provenance,
             quality,
+            render: self.render.as_ref().map_or(RenderMesh::NONE, |render| RenderMesh {
+                vertices: &render.vertices,
+                uvs: &render.uvs,
+                faces: &render.faces,
+            }),
         })
     }
 }

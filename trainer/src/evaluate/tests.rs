@@ -86,6 +86,7 @@ fn evaluation_ranks_the_three_ways_and_names_its_fields() {
         faces,
         shapes,
         shape_names,
+        render: None,
     };
     let input = EvaluationInput {
         package: &package,

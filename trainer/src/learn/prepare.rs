@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use sinew_formats::interchange::MeshSequence;
+use sinew_formats::interchange::{MeshSequence, RenderSurface};
 
 use super::{LearnError, Reporter};
 use crate::components::extract::BasisFrame;
@@ -25,6 +25,8 @@ pub struct Prepared {
     pub rest: Vec<[f64; 3]>,
     /// The same as in the file.
     pub rest_positions: Vec<[f32; 3]>,
+    /// Texture coordinates, where the reference has some: only passed on.
+    pub render: Option<RenderSurface>,
     /// One-rings.
     pub topology: Topology,
     /// The solve behind the features.
@@ -108,6 +110,7 @@ impl Prepared {
             aligned: aligned.iter().map(rounded).collect(),
             rest,
             rest_positions,
+            render: sequence.render.clone(),
             topology,
             system,
             areas,
@@ -148,6 +151,7 @@ impl Prepared {
             anchor_vertex: self.system.anchor() as u32,
             rotation_scale: self.scaler.rotation_scale,
             stretch_scale: self.scaler.stretch_scale,
+            render: self.render.clone(),
         }
     }
 

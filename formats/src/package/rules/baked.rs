@@ -4,7 +4,7 @@
 use super::{
     super::{
         BakedView, FAN_VERTICES, FastView, GROUP_NODES, OpenError, SKIN_WEIGHT_SUM, TILE_ENTRIES, TILE_SIDE, TierView,
-        limits,
+        limits, render,
     },
     BlockLinks, ascending_below, below, control, count, faces, finite_halves, names, offsets, positions, positive,
     same_count, tree, within,
@@ -45,10 +45,10 @@ pub(in super::super) fn check(view: &BakedView<'_>) -> Result<(), OpenError> {
         positive("components.value_scale", k, component.value_scale, limits::VALUE_SCALE)?;
     }
     tier(view, &view.exact(), 0.0)?;
-    match view.fast() {
-        Some(fast) => fast_tier(view, &fast, vertex_count),
-        None => Ok(()),
+    if let Some(fast) = view.fast() {
+        fast_tier(view, &fast, vertex_count)?;
     }
+    render::check(&view.render_mesh(), view.faces(), vertex_count)
 }
 
 fn fast_tier(view: &BakedView<'_>, fast: &FastView<'_>, vertex_count: usize) -> Result<(), OpenError> {

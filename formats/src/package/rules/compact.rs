@@ -1,7 +1,7 @@
 //! Rules of the compact payload.
 
 use super::{
-    super::{CompactView, GraphConvRecord, OpenError, limits},
+    super::{CompactView, GraphConvRecord, OpenError, limits, render},
     BlockLinks, below, control, count, finite_halves, mesh, names, positive, same_count, title, tree, within,
 };
 
@@ -39,7 +39,8 @@ pub(in super::super) fn check(view: &CompactView<'_>) -> Result<(), OpenError> {
     }
     supports(view, vertex_count)?;
     provenance(view)?;
-    quality(view)
+    quality(view)?;
+    render::check(&view.render_mesh(), view.faces(), vertex_count)
 }
 
 fn bridges(bridges: &[[u32; 2]], vertex_count: usize) -> Result<(), OpenError> {

@@ -10,7 +10,7 @@ mod tests;
 use super::{NONE, OpenError, limits};
 
 /// At least `least` and at most `limit` elements.
-fn count(field: &'static str, actual: usize, least: usize, limit: usize) -> Result<(), OpenError> {
+pub(super) fn count(field: &'static str, actual: usize, least: usize, limit: usize) -> Result<(), OpenError> {
     if actual < least {
         return Err(OpenError::TooFew { field, least, actual });
     }
@@ -21,7 +21,7 @@ fn count(field: &'static str, actual: usize, least: usize, limit: usize) -> Resu
 }
 
 /// A count that follows from others.
-fn same_count(field: &'static str, actual: usize, expected: usize) -> Result<(), OpenError> {
+pub(super) fn same_count(field: &'static str, actual: usize, expected: usize) -> Result<(), OpenError> {
     if actual == expected {
         Ok(())
     } else {
@@ -34,7 +34,13 @@ fn same_count(field: &'static str, actual: usize, expected: usize) -> Result<(),
 }
 
 /// Finite and from `least` to `greatest`.
-fn within(field: &'static str, index: usize, value: f32, least: f32, greatest: f32) -> Result<(), OpenError> {
+pub(super) fn within(
+    field: &'static str,
+    index: usize,
+    value: f32,
+    least: f32,
+    greatest: f32,
+) -> Result<(), OpenError> {
     if !value.is_finite() {
         return Err(OpenError::NotFinite { field, index });
     }
@@ -73,7 +79,7 @@ fn finite_halves<const N: usize>(field: &'static str, values: &[[u16; N]]) -> Re
 }
 
 /// `value < limit`.
-fn below(field: &'static str, index: usize, value: u32, limit: usize) -> Result<(), OpenError> {
+pub(super) fn below(field: &'static str, index: usize, value: u32, limit: usize) -> Result<(), OpenError> {
     if (value as usize) < limit {
         Ok(())
     } else {

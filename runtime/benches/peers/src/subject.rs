@@ -5,7 +5,7 @@
 use half::f16;
 use sinew_formats::package::{
     AlignedBytes, BlockRecord, CompactBasis, CompactView, ComponentRecord, FEATURE_COUNT, GraphConvRecord, NONE,
-    Provenance, Quality, write_compact,
+    Provenance, Quality, RenderMesh, write_compact,
 };
 
 use sinew_bake::mesh::{cotangent::EdgeWeights, topology::Topology, widened};
@@ -236,6 +236,7 @@ fn compact(rest: &[[f32; 3]], faces: &[[u32; 3]]) -> AlignedBytes {
             steps: 0,
             steps_run: 0,
         },
+        render: RenderMesh::NONE,
     })
     .expect("the made-up package keeps the rules")
 }

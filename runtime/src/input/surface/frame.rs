@@ -170,8 +170,8 @@ impl ControlSurface<'_> {
             }
             let goal = response.weight(slot.grip.held);
             let left = fabsf(goal - weight);
+            let rounding = ROUNDING * (response.maximum - response.minimum);
             if slot.grip.held != held {
-                let rounding = ROUNDING * (response.maximum - response.minimum);
                 let jumps = wiring.takeover == Takeover::Jump && !knob.encoder;
                 slot.budget = if jumps {
                     left
@@ -180,6 +180,10 @@ impl ControlSurface<'_> {
                 };
             }
             slot.budget = slot.budget.min(left);
+            // A slow way is many small steps, whose rounding must not leave the weight short of the knob.
+            if slot.grip.engaged && left - slot.budget <= rounding {
+                slot.budget = left;
+            }
             // A frame without time has no limit to multiply.
             let fastest = if response.slew.is_finite() {
                 response.slew * dt_s

@@ -6,6 +6,7 @@ mod lanes;
 pub(crate) mod poisson;
 pub(crate) mod skin;
 
+use super::adjoint::{HeldSums, Pull};
 use super::decode::{BlockRest, Decoder, FeatureScales, Group};
 use super::lanes::Gradient;
 use super::{Kernels, decode as generic};
@@ -32,4 +33,6 @@ kernel!(rest_activations(blocks: &mut [BlockRest]));
 kernel!(decode(decoder: &Decoder<'_>, gradients: &mut [Gradient]));
 kernel!(features(decoder: &Decoder<'_>, g: usize, features: &mut Group<f32>));
 kernel!(gradients(scales: FeatureScales, features: &Group<f32>, gradients: &mut [Gradient]));
+kernel!(held(decoder: &Decoder<'_>, pulls: &[Pull], features: &mut [Group<f32>], sums: &mut [HeldSums]));
+kernel!(derivatives(decoder: &Decoder<'_>, pulls: &[Pull], features: &[Group<f32>], sums: &mut [HeldSums]));
 kernel!(tangents(decoder: &Decoder<'_>, k: usize, scale: f32, gradients: &mut [Gradient]));

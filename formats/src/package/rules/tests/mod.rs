@@ -2,11 +2,12 @@
 
 mod baked;
 mod compact;
+mod render;
 
 use alloc::string::String;
 
 use super::super::fixture::{
-    COMPONENT_COUNT, TinyBaked, TinyCompact, TinyFast, VERTEX_COUNT, tiny_baked, tiny_compact,
+    COMPONENT_COUNT, TinyBaked, TinyCompact, TinyFast, TinyRender, VERTEX_COUNT, tiny_baked, tiny_compact,
 };
 use super::super::*;
 use OpenError::*;

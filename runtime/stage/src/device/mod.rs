@@ -1,0 +1,48 @@
+//! The one device of a performance: a serial port, a MIDI port or a socket behind one trait, chosen by the command line, else
+//! by `knobs.toml`, else the first serial port there is.
+
+mod choice;
+mod listen;
+mod touch;
+
+use sinew_runtime::input::{ControlSource, DeviceStatus};
+
+pub use choice::{DeviceArguments, identity, open, parse_osc};
+pub use listen::listen;
+pub use touch::Touch;
+
+/// A source that can tell people about itself.
+pub trait Device: ControlSource {
+    /// Everything known of it. Allocates: a few times a second at most.
+    fn device_status(&self) -> DeviceStatus;
+
+    /// What it calls a knob.
+    fn knob_name(&self, knob: u16) -> Option<String> {
+        let names = self.device_status().names;
+        names
+            .into_iter()
+            .find(|named| named.knob == knob)
+            .map(|named| named.name)
+    }
+}
+
+#[cfg(feature = "serial")]
+impl Device for sinew_runtime::input::SerialSource {
+    fn device_status(&self) -> DeviceStatus {
+        Self::device_status(self)
+    }
+}
+
+#[cfg(feature = "midi")]
+impl Device for sinew_runtime::input::MidiSource {
+    fn device_status(&self) -> DeviceStatus {
+        Self::device_status(self)
+    }
+}
+
+#[cfg(feature = "osc")]
+impl Device for sinew_runtime::input::OscSource {
+    fn device_status(&self) -> DeviceStatus {
+        Self::device_status(self)
+    }
+}
