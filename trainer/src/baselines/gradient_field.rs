@@ -145,7 +145,10 @@ impl FaceField {
             })
             .collect();
         let mean = areas.iter().sum::<f64>() / areas.len().max(1) as f64;
-        areas.iter().map(|area| if mean > 0.0 { (area / mean).max(0.01) } else { 1.0 }).collect()
+        areas
+            .iter()
+            .map(|area| if mean > 0.0 { (area / mean).max(0.01) } else { 1.0 })
+            .collect()
     }
 
     /// The faces.
@@ -270,7 +273,11 @@ mod tests {
         let turn = Rotation3::from_euler_angles(0.3, 0.8, -0.2).into_inner();
         // A turn keeps normals normal, so the gradient is the map itself.
         let shape: Vec<[f64; 3]> = rest.iter().map(|p| (turn * Vector3::from(*p)).into()).collect();
-        let deviations: Vec<Matrix3<f64>> = field.gradients(&shape).iter().map(|t| t - Matrix3::identity()).collect();
+        let deviations: Vec<Matrix3<f64>> = field
+            .gradients(&shape)
+            .iter()
+            .map(|t| t - Matrix3::identity())
+            .collect();
         let found = field.displacements(&deviations);
         let held = Vector3::from(shape[0]) - Vector3::from(rest[0]);
         for (v, d) in found.iter().enumerate() {
@@ -292,7 +299,11 @@ mod tests {
             let all = field.displacements(&deviations);
             for v in [0, 5, rest.len() - 1] {
                 let influence = field.influence(v);
-                let sum: Vector3<f64> = deviations.iter().zip(&influence).map(|(d, u)| d * Vector3::from(*u)).sum();
+                let sum: Vector3<f64> = deviations
+                    .iter()
+                    .zip(&influence)
+                    .map(|(d, u)| d * Vector3::from(*u))
+                    .sum();
                 assert!((sum - Vector3::from(all[v])).norm() < TOLERANCE, "vertex {v}");
             }
         }

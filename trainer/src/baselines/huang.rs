@@ -57,7 +57,13 @@ pub fn huang(
     let part = |first: usize, width: usize, count: usize| {
         let values: Vec<Vec<f64>> = samples
             .par_iter()
-            .map(|sample| sample.chunks_exact(9).flat_map(|x| &x[first..first + width]).copied().collect())
+            .map(|sample| {
+                sample
+                    .chunks_exact(9)
+                    .flat_map(|x| &x[first..first + width])
+                    .copied()
+                    .collect()
+            })
             .collect();
         splocs(&values, width, &of_faces, &SplocsSettings::published(count))
     };
@@ -76,8 +82,14 @@ pub fn huang(
         }
         values
     };
-    let turning = rotations.directions.iter().map(|direction| joined(Some(direction), None));
-    let stretching = stretches.directions.iter().map(|direction| joined(None, Some(direction)));
+    let turning = rotations
+        .directions
+        .iter()
+        .map(|direction| joined(Some(direction), None));
+    let stretching = stretches
+        .directions
+        .iter()
+        .map(|direction| joined(None, Some(direction)));
     LinearBasis {
         width: 9,
         mean: joined(Some(&rotations.mean), Some(&stretches.mean)),
@@ -122,7 +134,9 @@ mod tests {
                 let posed = model.pose(&projection.weights(sample));
                 let motion = RigidMotion::onto(shape, &posed);
                 let pairs = posed.iter().map(|&p| motion.apply(p)).zip(shape);
-                pairs.map(|(p, q)| (0..3).map(|c| (p[c] - q[c]).powi(2)).sum::<f64>()).sum::<f64>()
+                pairs
+                    .map(|(p, q)| (0..3).map(|c| (p[c] - q[c]).powi(2)).sum::<f64>())
+                    .sum::<f64>()
             });
             (errors.sum::<f64>() / (4 * rest.len()) as f64).sqrt()
         };

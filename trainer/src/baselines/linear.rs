@@ -22,7 +22,12 @@ impl LinearBasis {
     /// The vector at `weights` (`[K]`).
     pub fn compose(&self, weights: &[f64]) -> Vec<f64> {
         let mut sum = self.mean.clone();
-        for (direction, weight) in self.directions.iter().zip(weights).filter(|(_, weight)| **weight != 0.0) {
+        for (direction, weight) in self
+            .directions
+            .iter()
+            .zip(weights)
+            .filter(|(_, weight)| **weight != 0.0)
+        {
             for (sum, x) in sum.iter_mut().zip(direction) {
                 *sum += weight * x;
             }
@@ -61,7 +66,10 @@ impl<'b> LinearProjection<'b> {
             .into_par_iter()
             .map(|k| {
                 let weighted = weighted(&basis.directions[k], element_weights, basis.width);
-                basis.directions[..=k].iter().map(|other| product(&weighted, other)).collect()
+                basis.directions[..=k]
+                    .iter()
+                    .map(|other| product(&weighted, other))
+                    .collect()
             })
             .collect();
         let mut gram = DMatrix::from_fn(component_count, component_count, |i, j| rows[i.max(j)][i.min(j)]);
@@ -94,7 +102,9 @@ impl<'b> LinearProjection<'b> {
 
 fn weighted(values: &[f64], element_weights: &[f64], width: usize) -> Vec<f64> {
     let elements = values.chunks_exact(width).zip(element_weights);
-    elements.flat_map(|(x, weight)| x.iter().map(move |x| x * weight)).collect()
+    elements
+        .flat_map(|(x, weight)| x.iter().map(move |x| x * weight))
+        .collect()
 }
 
 /// Scalar product, in four running sums of fixed order.
@@ -127,7 +137,10 @@ mod tests {
         };
         let projection = LinearProjection::new(&basis, &[1.0, 1.0]);
         let weights = projection.weights(&basis.compose(&[0.5, -2.0]));
-        assert!((weights[0] - 0.5).abs() < 1e-7 && (weights[1] + 2.0).abs() < 1e-7, "{weights:?}");
+        assert!(
+            (weights[0] - 0.5).abs() < 1e-7 && (weights[1] + 2.0).abs() < 1e-7,
+            "{weights:?}"
+        );
         // The first direction alone cannot have both elements right: it serves the heavier one.
         let single = LinearBasis {
             directions: vec![basis.directions[0].clone()],

@@ -65,7 +65,14 @@ impl Model for PositionModel {
     }
 
     fn tangents(&self, _weights: &[f64]) -> Vec<Vec<[f32; 3]>> {
-        let narrowed = |direction: &Vec<f64>| direction.as_chunks::<3>().0.iter().map(|p| p.map(|x| x as f32)).collect();
+        let narrowed = |direction: &Vec<f64>| {
+            direction
+                .as_chunks::<3>()
+                .0
+                .iter()
+                .map(|p| p.map(|x| x as f32))
+                .collect()
+        };
         self.0.directions.iter().map(narrowed).collect()
     }
 }
@@ -171,7 +178,10 @@ impl GradientModel<'_> {
 
     fn deviations(&self, weights: &[f64]) -> Vec<Matrix3<f64>> {
         let features = self.features(weights);
-        features.iter().map(|x| gradient_of_feature(x) - Matrix3::identity()).collect()
+        features
+            .iter()
+            .map(|x| gradient_of_feature(x) - Matrix3::identity())
+            .collect()
     }
 }
 
@@ -285,7 +295,10 @@ impl Handles for GradientHandles<'_> {
 }
 
 fn count_elements(energies: &[Vec<f64>]) -> Vec<usize> {
-    energies.iter().map(|energy| energy.iter().filter(|&&e| e != 0.0).count()).collect()
+    energies
+        .iter()
+        .map(|energy| energy.iter().filter(|&&e| e != 0.0).count())
+        .collect()
 }
 
 #[cfg(test)]
@@ -304,7 +317,11 @@ mod tests {
         let topology = Topology::new(&faces, &rest);
         let weights = EdgeWeights::new(&topology, &rest);
         let system = PoissonSystem::new(&topology, &weights, &rest, 0).expect("definite");
-        let wave = |seed: usize| (0..9 * rest.len()).map(|d| 0.2 * ((d * seed) as f64).sin()).collect::<Vec<f64>>();
+        let wave = |seed: usize| {
+            (0..9 * rest.len())
+                .map(|d| 0.2 * ((d * seed) as f64).sin())
+                .collect::<Vec<f64>>()
+        };
         let mut second = wave(5);
         second[..45].fill(0.0);
         let basis = LinearBasis {

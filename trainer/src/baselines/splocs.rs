@@ -138,11 +138,14 @@ impl State<'_> {
                     x.iter_mut().for_each(|x| *x *= 1.0 - cost);
                 }
             }
-            self.residual.par_iter_mut().zip(&weights).for_each(|(residual, weight)| {
-                for (x, component) in residual.iter_mut().zip(&component) {
-                    *x -= weight * component;
-                }
-            });
+            self.residual
+                .par_iter_mut()
+                .zip(&weights)
+                .for_each(|(residual, weight)| {
+                    for (x, component) in residual.iter_mut().zip(&component) {
+                        *x -= weight * component;
+                    }
+                });
             self.weights.push(weights);
             self.components.push(component);
         }
@@ -163,7 +166,11 @@ impl State<'_> {
             if squared <= ZERO_COMPONENT {
                 // The residual gets back what little the component had explained.
                 let old = core::mem::replace(weights, vec![0.0; weights.len()]);
-                subtract(&mut self.residual, component, &old.iter().map(|w| -w).collect::<Vec<_>>());
+                subtract(
+                    &mut self.residual,
+                    component,
+                    &old.iter().map(|w| -w).collect::<Vec<_>>(),
+                );
                 continue;
             }
             let best: Vec<f64> = self
@@ -248,7 +255,9 @@ impl State<'_> {
                 }
             }
             for k in 0..count {
-                let squared: f64 = (0..width).map(|c| (free[c * count + k] + dual[c * count + k]).powi(2)).sum();
+                let squared: f64 = (0..width)
+                    .map(|c| (free[c * count + k] + dual[c * count + k]).powi(2))
+                    .sum();
                 let threshold = self.settings.sparsity * costs[k][e] / penalty;
                 let norm = squared.sqrt();
                 let shrink = if norm > threshold { 1.0 - threshold / norm } else { 0.0 };
@@ -320,7 +329,9 @@ mod tests {
 
     /// Distances on a line of elements.
     fn line(e: usize) -> Vec<f32> {
-        (0..ELEMENTS).map(|j| e.abs_diff(j) as f32 / (ELEMENTS - 1) as f32).collect()
+        (0..ELEMENTS)
+            .map(|j| e.abs_diff(j) as f32 / (ELEMENTS - 1) as f32)
+            .collect()
     }
 
     /// Two bumps far apart, moved independently, with weights in [0, 1].
@@ -354,7 +365,11 @@ mod tests {
         let (samples, planted) = planted();
         let basis = splocs(&samples, 3, &line, &SplocsSettings::published(2));
         for truth in &planted {
-            let best = basis.directions.iter().map(|c| cosine(c, truth).abs()).fold(0.0, f64::max);
+            let best = basis
+                .directions
+                .iter()
+                .map(|c| cosine(c, truth).abs())
+                .fold(0.0, f64::max);
             assert!(best > 0.99, "cosine {best}");
         }
     }
@@ -372,14 +387,24 @@ mod tests {
             let energy = basis.energy(k);
             let total: f64 = energy.iter().sum();
             let distances = line(greatest(&energy));
-            let outside: f64 = energy.iter().zip(&distances).filter(|(_, d)| **d > 0.5).map(|(e, _)| e).sum();
+            let outside: f64 = energy
+                .iter()
+                .zip(&distances)
+                .filter(|(_, d)| **d > 0.5)
+                .map(|(e, _)| e)
+                .sum();
             assert!(outside <= 1e-6 * total, "component {k}: {outside} of {total}");
         }
     }
 
     #[test]
     fn nothing_that_moves_gives_nothing() {
-        let basis = splocs(&[vec![1.0; 6], vec![1.0; 6]], 3, &|_| vec![0.0; 2], &SplocsSettings::published(2));
+        let basis = splocs(
+            &[vec![1.0; 6], vec![1.0; 6]],
+            3,
+            &|_| vec![0.0; 2],
+            &SplocsSettings::published(2),
+        );
         assert_eq!((basis.used_count(), basis.mean), (0, vec![1.0; 6]));
     }
 }

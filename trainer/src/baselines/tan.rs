@@ -175,7 +175,10 @@ mod tests {
         };
         let config = tan.config(&TrainConfig::default());
         let train_shapes = [0, 1, 2, 3, 4, 5];
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("threads");
         pool.install(|| {
             let prepared = Prepared::new(&sequence, &train_shapes, &config, &Silent).expect("a usable bar");
             let bytes = train(&prepared, &config, &tan, "bar", &train_shapes, 6, &Silent).expect("trains");

@@ -46,7 +46,10 @@ impl<'a> Bench<'a> {
             let aligned = align_shapes(&prepared.rest, shapes).into_iter();
             aligned.map(|shape| shape.positions).collect()
         };
-        let moving = input.train_shapes.iter().filter(|&&m| m != 0 && m < sequence.shape_count());
+        let moving = input
+            .train_shapes
+            .iter()
+            .filter(|&&m| m != 0 && m < sequence.shape_count());
         let moving: Vec<Vec<[f32; 3]>> = moving.map(|&m| sequence.shapes[m].clone()).collect();
         let mut train = vec![prepared.rest.clone()];
         train.extend(aligned(&moving));
@@ -84,7 +87,9 @@ impl<'a> Bench<'a> {
             .par_iter()
             .filter_map(|energy| {
                 let total: f64 = energy.iter().sum();
-                let centre = (0..energy.len()).rev().max_by(|&a, &b| energy[a].total_cmp(&energy[b]))?;
+                let centre = (0..energy.len())
+                    .rev()
+                    .max_by(|&a, &b| energy[a].total_cmp(&energy[b]))?;
                 let distances = self.prepared.distances(centre);
                 let near = energy.iter().zip(&distances).filter(|(_, d)| **d <= LOCAL_RADIUS);
                 (total > 0.0).then(|| near.map(|(e, _)| e).sum::<f64>() / total)

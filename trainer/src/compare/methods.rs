@@ -8,7 +8,8 @@ use sinew_formats::package::{AlignedBytes, BakedView, CompactView};
 use super::bench::{Bench, narrowed};
 use super::fitting::{project_linear, project_positions, weights_from_handles};
 use super::{
-    CompareError, CompareInput, ComparedShapes, Comparison, HANDLE_COUNTS, Method, Projection, ProjectionKind, two_levels,
+    CompareError, CompareInput, ComparedShapes, Comparison, HANDLE_COUNTS, Method, Projection, ProjectionKind,
+    two_levels,
 };
 use crate::bake::bake;
 use crate::baselines::gradient_field::{FaceField, GradientField};
@@ -35,10 +36,7 @@ const SPLOCS_SOURCE: &str = "Neumann et al. 2013";
 
 /// Compares. The same figures for any number of threads, times excepted.
 /// Errors: a split that leaves nothing to learn from or to measure, a package of another mesh or split, a wish to stop.
-pub fn compare(
-    input: CompareInput<'_>,
-    reporter: &dyn Reporter,
-) -> Result<(Comparison, ComparedShapes), CompareError> {
+pub fn compare(input: CompareInput<'_>, reporter: &dyn Reporter) -> Result<(Comparison, ComparedShapes), CompareError> {
     keep_linear_algebra_serial();
     let bench = Bench::new(input, reporter)?;
     let settings = input.settings;
@@ -50,7 +48,11 @@ pub fn compare(
         bench.prepared.spread_vertices(HANDLE_COUNTS[HANDLE_COUNTS.len() - 1])
     };
     let mut run = Run {
-        control_points: HANDLE_COUNTS.iter().copied().filter(|&count| count <= handles.len()).collect(),
+        control_points: HANDLE_COUNTS
+            .iter()
+            .copied()
+            .filter(|&count| count <= handles.len())
+            .collect(),
         handles,
         methods: Vec::new(),
         reconstructions: Vec::new(),
@@ -103,7 +105,9 @@ pub fn compare(
     run.one_level_autoencoder()?;
     run.ours()?;
 
-    let round_trip = run.round_trip.ok_or(EvaluationError::Score(crate::evaluate::ScoreError::Nothing))?;
+    let round_trip = run
+        .round_trip
+        .ok_or(EvaluationError::Score(crate::evaluate::ScoreError::Nothing))?;
     let shapes = ComparedShapes {
         shapes: bench.test_shapes.clone(),
         truth: bench.test.iter().map(|shape| narrowed(shape)).collect(),
@@ -183,7 +187,10 @@ impl Run<'_, '_> {
             shapes.map(|shape| project_linear(&basis, &projection, shape)).collect()
         };
         let model = PositionModel(basis.clone());
-        let posed = weights_of(&self.bench.test).par_iter().map(|w| narrowed(&model.pose(w))).collect();
+        let posed = weights_of(&self.bench.test)
+            .par_iter()
+            .map(|w| narrowed(&model.pose(w)))
+            .collect();
         let trained = Trained {
             name,
             source,
@@ -225,7 +232,10 @@ impl Run<'_, '_> {
         };
         let mut found = vec![Found {
             kind: ProjectionKind::Features,
-            shapes: weights.par_iter().map(|weights| narrowed(&model.pose(weights))).collect(),
+            shapes: weights
+                .par_iter()
+                .map(|weights| narrowed(&model.pose(weights)))
+                .collect(),
             max_percentage_error: Some(missed.into_iter().fold(0.0, f64::max)),
         }];
         if !self.bench.input.settings.quick {
@@ -395,7 +405,8 @@ impl Run<'_, '_> {
             projections,
             control_point_e_rms: self.move_by_handles(model, &trained.train_weights).map_err(fail)?,
         });
-        self.reconstructions.push(found.into_iter().map(|found| found.shapes).collect());
+        self.reconstructions
+            .push(found.into_iter().map(|found| found.shapes).collect());
         self.reporter.advance(1, "");
         Ok(())
     }
@@ -417,7 +428,9 @@ impl Run<'_, '_> {
             })
             .collect();
         let count = HANDLE_SHAPES.min(bench.test.len());
-        let chosen: Vec<usize> = (0..count).map(|i| (2 * i + 1) * bench.test.len() / (2 * count)).collect();
+        let chosen: Vec<usize> = (0..count)
+            .map(|i| (2 * i + 1) * bench.test.len() / (2 * count))
+            .collect();
         let truth: Vec<Vec<[f32; 3]>> = chosen.iter().map(|&n| bench.truth[n].clone()).collect();
         let handles = model.handles(&self.handles);
         let diagonal = bench.diagonal();

@@ -8,8 +8,8 @@ mod bench;
 pub mod fitting;
 mod methods;
 
-use sinew_formats::interchange::MeshSequence;
 use serde::{Deserialize, Serialize};
+use sinew_formats::interchange::MeshSequence;
 
 use crate::config::TrainConfig;
 use crate::evaluate::{EvaluationError, ScoreError, Scores};
@@ -173,7 +173,9 @@ pub enum CompareError {
 
 /// Two levels that together have as near to `budget` components as can be, about four fine ones under each coarse one.
 pub fn two_levels(budget: usize) -> Vec<usize> {
-    let candidates = (1..=12).map(|fine| (budget / (1 + fine), fine)).filter(|(coarse, _)| *coarse > 0);
+    let candidates = (1..=12)
+        .map(|fine| (budget / (1 + fine), fine))
+        .filter(|(coarse, _)| *coarse > 0);
     let best = candidates.min_by_key(|&(coarse, fine)| (budget - coarse * (1 + fine), fine.abs_diff(4)));
     best.map_or_else(|| vec![budget.max(1)], |(coarse, fine)| vec![coarse, fine])
 }

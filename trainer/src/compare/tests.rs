@@ -30,7 +30,10 @@ fn run(threads: usize, quick: bool) -> (Comparison, ComparedShapes) {
         seed: 2,
     };
     let sequence = Subject::Bar.synthesize(&settings).expect("a bar");
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .expect("threads");
     pool.install(|| {
         let input = CompareInput {
             sequence: &sequence,
@@ -53,7 +56,10 @@ fn every_method_is_measured_and_threads_change_nothing() {
     assert_eq!((one.train_shapes, one.test_shapes, shapes.truth.len()), (4, 7, 7));
     assert_eq!(one.control_points, HANDLE_COUNTS);
     let names: Vec<&str> = one.methods.iter().map(|method| method.name.as_str()).collect();
-    assert!(names.starts_with(&["PCA on positions", "SPLOCS on positions"]) && names.ends_with(&["Sinew"]), "{names:?}");
+    assert!(
+        names.starts_with(&["PCA on positions", "SPLOCS on positions"]) && names.ends_with(&["Sinew"]),
+        "{names:?}"
+    );
     for (method, found) in one.methods.iter().zip(&shapes.reconstructions) {
         assert!(method.components <= 10 && method.components > 0, "{method:?}");
         assert!(method.locality > 0.0 && method.locality <= 1.0 + 1e-9, "{method:?}");
@@ -65,7 +71,13 @@ fn every_method_is_measured_and_threads_change_nothing() {
         };
         assert!(*last <= 1.05 * first, "more control points say more: {method:?}");
         for kind in [ProjectionKind::Encoder, ProjectionKind::Features] {
-            let of = |kind| method.projections.iter().find(|p| p.kind == kind).map(|p| p.scores.e_rms);
+            let of = |kind| {
+                method
+                    .projections
+                    .iter()
+                    .find(|p| p.kind == kind)
+                    .map(|p| p.scores.e_rms)
+            };
             if let (Some(other), Some(positions)) = (of(kind), of(ProjectionKind::Positions)) {
                 assert!(positions <= other * 1.001, "{}: {positions} from {other}", method.name);
             }
@@ -79,7 +91,13 @@ fn every_method_is_measured_and_threads_change_nothing() {
 
 #[test]
 fn levels_share_the_budget() {
-    for (budget, levels) in [(50, vec![10, 4]), (60, vec![12, 4]), (10, vec![2, 4]), (1, vec![1]), (2, vec![1, 1])] {
+    for (budget, levels) in [
+        (50, vec![10, 4]),
+        (60, vec![12, 4]),
+        (10, vec![2, 4]),
+        (1, vec![1]),
+        (2, vec![1, 1]),
+    ] {
         let found = two_levels(budget);
         assert_eq!(found, levels, "{budget}");
     }
