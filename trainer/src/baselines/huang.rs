@@ -7,7 +7,7 @@
 //! the surface is what the as-consistent-as-possible features came to cure. The budget is shared equally: rotations get
 //! the odd component.
 
-use nalgebra::Rotation3;
+use nalgebra::{Rotation3, UnitQuaternion};
 use rayon::prelude::*;
 
 use super::gradient_field::FaceField;
@@ -23,7 +23,8 @@ pub fn face_features(field: &FaceField, shape: &[[f64; 3]]) -> Vec<f64> {
         .iter()
         .flat_map(|gradient| {
             let Polar { rotation, stretch: s } = Polar::of(gradient);
-            let r = Rotation3::from_matrix_unchecked(rotation).scaled_axis();
+            // By way of quaternions: rounding near no turn and near half a turn does no harm there.
+            let r = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(rotation)).scaled_axis();
             let feature = [
                 r[0],
                 r[1],

@@ -3,6 +3,7 @@
 //! Path of data: training shapes -> one file a method -> [`linear::LinearBasis`] -> [`model::Model`], which
 //! [`crate::compare`] fits to unseen shapes, scores, and moves by handles.
 
+pub mod bernard;
 pub mod gradient_field;
 pub mod huang;
 pub mod linear;

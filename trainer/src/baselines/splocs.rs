@@ -1,6 +1,7 @@
 //! Sparse localized deformation components: Neumann, Varanasi, Wenger, Wacker, Magnor, Theobalt, *Sparse Localized
 //! Deformation Components* (ACM TOG 2013, sections 3 and 4). Minimises `|X - W C|^2 + sum_k sum_e Lambda_ke |C_ke|_2` with
-//! weights in [0, 1] whose greatest is 1, by turns over W (block coordinate descent) and C (ADMM).
+//! weights in [0, 1] whose greatest is 1, by turns over W (block coordinate descent) and C (ADMM). X is measured from the first
+//! sample, the authors' default: from a mean, weights that are never negative could go one way only.
 //!
 //! Values are of any width an element: positions of vertices (3), as in the paper; features (9), as its successors do;
 //! rotations and stretches of faces.
@@ -45,7 +46,7 @@ impl SplocsSettings {
     }
 }
 
-/// Factors `samples` (shape `[N][E x width]`). `distances(e)` gives distances of all elements from element e along the
+/// Factors `samples` (shape `[N][E x width]`, at least one; the first is the rest state). `distances(e)` gives distances of all elements from element e along the
 /// surface, shape `[E]`, the longest on the mesh being 1. The same bits for any number of threads.
 pub fn splocs(
     samples: &[Vec<f64>],
@@ -53,36 +54,22 @@ pub fn splocs(
     distances: &(dyn Fn(usize) -> Vec<f32> + Sync),
     settings: &SplocsSettings,
 ) -> LinearBasis {
-    let length = samples.first().map_or(0, Vec::len);
-    let mean: Vec<f64> = (0..length)
-        .into_par_iter()
-        .map(|d| samples.iter().map(|x| x[d]).sum::<f64>() / samples.len() as f64)
-        .collect();
-    let mut centred: Vec<Vec<f64>> = samples
-        .par_iter()
-        .map(|x| x.iter().zip(&mean).map(|(x, mean)| x - mean).collect())
-        .collect();
-    let energy: f64 = centred.iter().map(|x| product(x, x)).sum();
-    let deviation = (energy / (length * samples.len()).max(1) as f64).sqrt();
-    if deviation == 0.0 {
-        return LinearBasis {
-            width,
-            mean,
-            directions: vec![vec![0.0; length]; settings.component_count],
-        };
-    }
-    centred.iter_mut().flatten().for_each(|x| *x /= deviation);
-
+    let Start {
+        deviation,
+        scaled,
+        residual,
+        weights,
+        components,
+    } = greedy_start(samples, &samples[0], width, distances, settings);
     let mut state = State {
-        samples: &centred,
+        samples: &scaled,
         width,
         distances,
         settings,
-        residual: centred.clone(),
-        weights: Vec::new(),
-        components: Vec::new(),
+        residual,
+        weights,
+        components,
     };
-    state.start();
     for _ in 0..settings.rounds {
         state.update_weights();
         state.update_components();
@@ -91,13 +78,69 @@ pub fn splocs(
     directions.iter_mut().flatten().for_each(|x| *x *= deviation);
     LinearBasis {
         width,
-        mean,
+        mean: samples[0].clone(),
         directions,
     }
 }
 
+/// Where the turns begin: everything less an origin, in values of unit variance.
+pub(super) struct Start {
+    /// Units of the samples in one of the values; 1 where nothing moves.
+    pub deviation: f64,
+    /// The samples, less the origin and scaled. Shape: `[N][D]`.
+    pub scaled: Vec<Vec<f64>>,
+    /// What the components leave of them. Shape: `[N][D]`.
+    pub residual: Vec<Vec<f64>>,
+    /// Shape: `[K][N]`.
+    pub weights: Vec<Vec<f64>>,
+    /// Shape: `[K][D]`.
+    pub components: Vec<Vec<f64>>,
+}
+
+/// Components one by one, each where most is left to explain.
+pub(super) fn greedy_start(
+    samples: &[Vec<f64>],
+    origin: &[f64],
+    width: usize,
+    distances: &(dyn Fn(usize) -> Vec<f32> + Sync),
+    settings: &SplocsSettings,
+) -> Start {
+    let length = samples.first().map_or(0, Vec::len);
+    let mut scaled: Vec<Vec<f64>> = samples
+        .par_iter()
+        .map(|x| x.iter().zip(origin).map(|(x, origin)| x - origin).collect())
+        .collect();
+    let energy: f64 = scaled.iter().map(|x| product(x, x)).sum();
+    let deviation = (energy / (length * samples.len()).max(1) as f64).sqrt();
+    let deviation = if deviation > 0.0 { deviation } else { 1.0 };
+    scaled.iter_mut().flatten().for_each(|x| *x /= deviation);
+    let mut state = State {
+        samples: &scaled,
+        width,
+        distances,
+        settings,
+        residual: scaled.clone(),
+        weights: Vec::new(),
+        components: Vec::new(),
+    };
+    state.start();
+    let State {
+        residual,
+        weights,
+        components,
+        ..
+    } = state;
+    Start {
+        deviation,
+        scaled,
+        residual,
+        weights,
+        components,
+    }
+}
+
 struct State<'a> {
-    /// Centred, unit variance. Shape: `[N][D]`.
+    /// Less the first, unit variance. Shape: `[N][D]`.
     samples: &'a [Vec<f64>],
     width: usize,
     distances: &'a (dyn Fn(usize) -> Vec<f32> + Sync),

@@ -20,6 +20,7 @@ use super::{Failure, check_output, chosen_shapes, load_package, load_sequence};
     after_help = "All methods train on the same shapes with the same number of components and are measured on the others:
   PCA                     on positions and on this project's features
   SPLOCS                  Neumann et al. 2013, on positions and on features
+  Local factors           Bernard et al. 2016, on positions
   Deformation gradients   Huang et al. 2014
   One-level autoencoder   Tan et al. 2018
   Sinew                   this project, or --ours PACKAGE

@@ -12,6 +12,7 @@ use super::{
     two_levels,
 };
 use crate::bake::bake;
+use crate::baselines::bernard::bernard;
 use crate::baselines::gradient_field::{FaceField, GradientField};
 use crate::baselines::huang::{face_features, huang};
 use crate::baselines::linear::{LinearBasis, LinearProjection};
@@ -69,6 +70,12 @@ pub fn compare(input: CompareInput<'_>, reporter: &dyn Reporter) -> Result<(Comp
     run.positions("SPLOCS on positions", SPLOCS_SOURCE, || {
         let flat: Vec<Vec<f64>> = bench.train.iter().map(|shape| shape.as_flattened().to_vec()).collect();
         splocs(&flat, 3, &distances, &SplocsSettings::published(count))
+    })?;
+
+    run.positions("Local factors", "Bernard et al. 2016", || {
+        let flat: Vec<Vec<f64>> = bench.train.iter().map(|shape| shape.as_flattened().to_vec()).collect();
+        let (topology, rest) = (&bench.prepared.topology, &bench.prepared.rest);
+        bernard(&flat, topology, rest, &distances, count)
     })?;
 
     let scales = bench.prepared.scaler.scales();
