@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 use miette::{IntoDiagnostic, WrapErr, miette};
 use sinew_formats::package::CompactView;
-use sinew_trainer::compare::{CompareError, CompareInput, CompareSettings, Comparison, LOCAL_RADIUS, compare};
+use sinew_trainer::compare::{
+    CompareError, CompareInput, CompareSettings, Comparison, LOCAL_RADIUS, NOT_COMPARED, compare,
+};
 use sinew_trainer::config::TrainConfig;
 use sinew_trainer::learn::LearnError;
 use sinew_trainer::report::compare_page::comparison_page;
@@ -179,6 +181,7 @@ fn print_table(comparison: &Comparison) {
         "features alone (floor)", "", "", floor.e_rms, floor.sted
     );
     println!("local: share of a component's energy within {LOCAL_RADIUS} of the longest distance from its centre");
+    println!("{NOT_COMPARED}");
     if !comparison.control_points.is_empty() {
         println!();
         print!("{:<22}", "E_rms, control points");

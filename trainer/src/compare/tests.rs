@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::learn::Silent;
+use crate::report::compare_page::comparison_page;
 use crate::synthesize::{Settings, Subject};
 
 fn small(quick: bool) -> CompareSettings {
@@ -23,13 +24,17 @@ fn small(quick: bool) -> CompareSettings {
     }
 }
 
-fn run(threads: usize, quick: bool) -> (Comparison, ComparedShapes) {
+fn bar() -> MeshSequence {
     let settings = Settings {
         frames: 11,
         vertices: 130,
         seed: 2,
     };
-    let sequence = Subject::Bar.synthesize(&settings).expect("a bar");
+    Subject::Bar.synthesize(&settings).expect("a bar")
+}
+
+fn run(threads: usize, quick: bool) -> (Comparison, ComparedShapes) {
+    let sequence = bar();
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
@@ -85,6 +90,20 @@ fn every_method_is_measured_and_threads_change_nothing() {
     }
     let (quick, _) = run(1, true);
     assert!(quick.control_points.is_empty() && quick.methods.iter().all(|m| m.control_point_e_rms.is_empty()));
+    let page = comparison_page(&one, &shapes, &bar()).expect("a page");
+    assert!(!page.text().contains("http"), "the page stands alone");
+    for part in [
+        "Errors on unseen shapes",
+        "All figures",
+        "Moved by control points",
+        "The worst of each",
+    ] {
+        assert!(page.text().contains(part), "{part}");
+    }
+    // Truth once, and every method on the common shape and on its worst.
+    assert_eq!(page.text().matches("<img").count(), 1 + 2 * one.methods.len());
+    assert_eq!(page.text().matches("<polyline").count(), one.methods.len());
+
     let text = serde_json::to_string(&quick).expect("JSON");
     let back: Comparison = serde_json::from_str(&text).expect("the same");
     let kinds = |comparison: &Comparison| -> Vec<(String, Vec<ProjectionKind>)> {
@@ -109,4 +128,25 @@ fn levels_share_the_budget() {
         let found = two_levels(budget);
         assert_eq!(found, levels, "{budget}");
     }
+}
+
+#[test]
+fn a_split_that_leaves_nothing_is_refused() {
+    let sequence = bar();
+    let all: Vec<usize> = (0..sequence.shape_count()).collect();
+    let settings = small(true);
+    let input = |train_shapes| CompareInput {
+        sequence: &sequence,
+        train_shapes,
+        ours: None,
+        settings: &settings,
+    };
+    assert!(matches!(
+        compare(input(&all), &Silent),
+        Err(CompareError::NothingToMeasure(11))
+    ));
+    assert!(matches!(
+        compare(input(&[0]), &Silent),
+        Err(CompareError::Learn(LearnError::TooFewShapes { .. }))
+    ));
 }
