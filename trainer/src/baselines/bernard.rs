@@ -94,7 +94,7 @@ pub fn factorise(
         .map(|d| samples.iter().map(|x| x[d]).sum::<f64>() / samples.len() as f64)
         .collect();
     let published = SplocsSettings::published(settings.component_count);
-    let start = greedy_start(samples, &mean, 3, distances, &published);
+    let start = greedy_start(samples, &mean, 3, distances, &published, true);
     let mut residual = start.residual;
     let (mut coefficients, mut factors) = (start.weights, start.components);
     let edges = Edges::new(topology, rest);

@@ -60,7 +60,7 @@ pub fn splocs(
         residual,
         weights,
         components,
-    } = greedy_start(samples, &samples[0], width, distances, settings);
+    } = greedy_start(samples, &samples[0], width, distances, settings, false);
     let mut state = State {
         samples: &scaled,
         width,
@@ -97,13 +97,14 @@ pub(super) struct Start {
     pub components: Vec<Vec<f64>>,
 }
 
-/// Components one by one, each where most is left to explain.
+/// Components one by one, each where most is left to explain. `signed` lets weights be any, instead of in [0, 1].
 pub(super) fn greedy_start(
     samples: &[Vec<f64>],
     origin: &[f64],
     width: usize,
     distances: &(dyn Fn(usize) -> Vec<f32> + Sync),
     settings: &SplocsSettings,
+    signed: bool,
 ) -> Start {
     let length = samples.first().map_or(0, Vec::len);
     let mut scaled: Vec<Vec<f64>> = samples
@@ -123,7 +124,7 @@ pub(super) fn greedy_start(
         weights: Vec::new(),
         components: Vec::new(),
     };
-    state.start();
+    state.start(signed);
     let State {
         residual,
         weights,
@@ -155,7 +156,7 @@ struct State<'a> {
 
 impl State<'_> {
     /// Components one by one: each explains the element of greatest residual, faded out with the distance from it.
-    fn start(&mut self) {
+    fn start(&mut self, signed: bool) {
         let width = self.width;
         let element_count = self.residual[0].len() / width;
         for _ in 0..self.settings.component_count {
@@ -167,7 +168,7 @@ impl State<'_> {
                 })
                 .collect();
             let centre = greatest(&energies);
-            let weights = explaining_weights(&self.residual, centre, width);
+            let weights = explaining_weights(&self.residual, centre, width, signed);
             let squared = product(&weights, &weights);
             let support = self.support(centre);
             let mut component = vec![0.0; element_count * width];
@@ -327,8 +328,9 @@ fn subtract(residual: &mut [Vec<f64>], component: &[f64], weights: &[f64]) {
     });
 }
 
-/// Weights of the one direction that explains most of what an element does, of both signs the one that fits the range better.
-fn explaining_weights(residual: &[Vec<f64>], element: usize, width: usize) -> Vec<f64> {
+/// Weights of the one direction that explains most of what an element does: as they are where `signed`, or of both signs the
+/// one that fits the range better.
+fn explaining_weights(residual: &[Vec<f64>], element: usize, width: usize, signed: bool) -> Vec<f64> {
     let values: Vec<&[f64]> = residual
         .iter()
         .map(|x| &x[element * width..(element + 1) * width])
@@ -340,6 +342,9 @@ fn explaining_weights(residual: &[Vec<f64>], element: usize, width: usize) -> Ve
         .iter()
         .map(|x| x.iter().zip(direction.iter()).map(|(x, d)| x * d).sum())
         .collect();
+    if signed {
+        return along;
+    }
     let against: Vec<f64> = along.iter().map(|x| -x).collect();
     let (positive, negative) = (onto_unit_range(&along), onto_unit_range(&against));
     if product(&positive, &positive) >= product(&negative, &negative) {

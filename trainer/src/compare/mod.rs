@@ -1,7 +1,7 @@
 //! The systems of the paper's table on one sequence: trained on the same shapes with the same budget of components, measured
 //! on the same unseen shapes by the same figures.
 //!
-//! Path of data: sequence, split -> [`Bench`](bench::Bench) (aligned shapes, features) -> [`crate::baselines`] and this
+//! Path of data: sequence, split -> `Bench` (aligned shapes, features) -> [`crate::baselines`] and this
 //! project's own training -> weights of unseen shapes, each method's own way ([`fitting`]) -> [`Comparison`].
 
 mod bench;
@@ -86,7 +86,7 @@ pub struct Method {
     pub source: String,
     /// Components that are not zero.
     pub components: usize,
-    /// Seconds of training, features not counted; `None` where it was trained before.
+    /// Seconds of training, features not counted but in this project's own; `None` where it was trained before.
     pub training_seconds: Option<f64>,
     /// Share of a component's energy within [`LOCAL_RADIUS`] of its centre, mean over components, in the values that the
     /// method factors.
