@@ -70,7 +70,9 @@ fn describe_baked(view: &BakedView<'_>) -> String {
     view.components().for_each(|component| line("component", &component));
     line("fan_offsets", &view.fan_offsets());
     line("fans", &view.fans());
-    describe_tier(&view.exact(), &mut |field, value| line(&format!("exact.{field}"), value));
+    describe_tier(&view.exact(), &mut |field, value| {
+        line(&format!("exact.{field}"), value)
+    });
     if let Some(fast) = view.fast() {
         describe_tier(&fast.nodes(), &mut |field, value| {
             line(&format!("fast.nodes.{field}"), value);

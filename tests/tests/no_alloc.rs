@@ -7,8 +7,8 @@ use std::alloc::System;
 use sinew_formats::package::{fixture::tiny_baked, write_baked};
 use sinew_runtime::{
     Attribute, Basis, Batch, ControlError, Controls, Drag, Frame, FrameError, FrameOutcome, Handles, HandlesLayout,
-    Instance, Kernels, Normals, OpenError, Reconstruct, Tangent, TierChoice, VertexLayout, VertexOutput, Workspace, WorkspaceError,
-    WorkspaceLayout,
+    Instance, Kernels, Normals, OpenError, Reconstruct, Tangent, TierChoice, VertexLayout, VertexOutput, Workspace,
+    WorkspaceError, WorkspaceLayout,
 };
 
 thread_local! {
