@@ -49,6 +49,8 @@ mod output;
 mod reconstruct;
 mod simd;
 mod solve;
+#[doc(hidden)]
+pub mod steps;
 pub mod take;
 mod workspace;
 

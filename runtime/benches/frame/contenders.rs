@@ -6,7 +6,10 @@ use sinew_peers::morph::MorphTargets;
 use sinew_peers::skinning::Skin;
 use sinew_peers::solvers::{FaerSimplicial, LowerTriangle};
 use sinew_peers::subject::Subject;
-use sinew_runtime::{Basis, Controls, Frame, Kernels, Normals, Reconstruct, Workspace, WorkspaceLayout};
+use sinew_runtime::{
+    Basis, Controls, Drag, Frame, FrameError, Handles, HandlesLayout, Kernels, Normals, Reconstruct, TierChoice,
+    Workspace, WorkspaceLayout, steps,
+};
 
 use crate::measure::Contender;
 
@@ -29,12 +32,17 @@ impl Contenders {
             if kernels.run_here() {
                 let widest = kernels == Kernels::detect();
                 let all = basis.component_count();
-                contenders.push(frame(&basis, kernels, all, true));
+                contenders.push(frame(&basis, TierChoice::Exact, kernels, all, true));
                 if widest {
-                    contenders.push(frame(&basis, kernels, all, false));
-                    contenders.push(frame(&basis, kernels, all.min(10), true));
+                    contenders.push(frame(&basis, TierChoice::Exact, kernels, all, false));
+                    contenders.push(frame(&basis, TierChoice::Exact, kernels, all.min(10), true));
+                    if basis.fast_node_count().is_some() {
+                        contenders.push(frame(&basis, TierChoice::Fast, kernels, all, true));
+                    }
+                    contenders.extend([1, 4].map(|held| drag(&basis, kernels, held)));
                     contenders.push(unchanged(&basis, kernels));
                     contenders.push(solve_path(&basis, kernels));
+                    contenders.extend(steps(&basis, kernels));
                 }
             }
         }
@@ -47,20 +55,28 @@ impl Contenders {
 }
 
 /// Memory that outlives the benchmark: a few contenders, once a run.
-fn workspace(basis: &Basis<'_>, kernels: Kernels) -> Workspace<'static> {
-    let memory = vec![0; WorkspaceLayout::for_basis(basis).unaligned_bytes()];
-    Workspace::with_kernels(basis, memory.leak(), kernels).expect("enough memory")
+fn workspace(basis: &Basis<'_>, tier: TierChoice, kernels: Kernels) -> Workspace<'static> {
+    let layout = WorkspaceLayout::for_tier(basis, tier).expect("the package has the tier");
+    let memory = vec![0; layout.unaligned_bytes()];
+    Workspace::for_tier(basis, tier, memory.leak(), kernels).expect("enough memory")
 }
 
-fn frame<'c>(basis: &'c Basis<'c>, kernels: Kernels, active: usize, with_normals: bool) -> Contender<'c> {
-    let mut workspace = workspace(basis, kernels);
+fn frame<'c>(
+    basis: &'c Basis<'c>,
+    tier: TierChoice,
+    kernels: Kernels,
+    active: usize,
+    with_normals: bool,
+) -> Contender<'c> {
+    let mut workspace = workspace(basis, tier, kernels);
     let component_count = basis.component_count();
     let poses: Vec<Vec<f32>> = (0..POSES).map(|n| Subject::pose(component_count, active, n)).collect();
     let mut weights = vec![0.0; component_count];
     let mut positions = vec![[0.0; 3]; basis.vertex_count()];
     let mut normals = positions.clone();
     let name = format!(
-        "frame, {kernels:?}, {active} active{}",
+        "{} frame, {kernels:?}, {active} active{}",
+        if tier == TierChoice::Fast { "fast" } else { "exact" },
         if with_normals { ", normals" } else { "" }
     );
     let run = move |round: usize| {
@@ -85,7 +101,7 @@ fn frame<'c>(basis: &'c Basis<'c>, kernels: Kernels, active: usize, with_normals
 
 /// A frame in which no control moved.
 fn unchanged<'c>(basis: &'c Basis<'c>, kernels: Kernels) -> Contender<'c> {
-    let mut one = frame(basis, kernels, basis.component_count(), true);
+    let mut one = frame(basis, TierChoice::Exact, kernels, basis.component_count(), true);
     Contender {
         name: format!("frame, {kernels:?}, nothing moved"),
         is_yardstick: false,
@@ -93,9 +109,39 @@ fn unchanged<'c>(basis: &'c Basis<'c>, kernels: Kernels) -> Contender<'c> {
     }
 }
 
+/// One update of a drag: some vertices are held, the first goes back and forth.
+fn drag<'c>(basis: &'c Basis<'c>, kernels: Kernels, held: usize) -> Contender<'c> {
+    let mut workspace = workspace(basis, TierChoice::Exact, kernels);
+    let memory = vec![0; HandlesLayout::for_basis(basis, held).unaligned_bytes()].leak();
+    let mut handles = Handles::new(basis, held, memory).expect("enough memory");
+    let vertices: Vec<usize> = (0..held).map(|n| n * basis.vertex_count() / held).collect();
+    for &vertex in &vertices {
+        handles.add(basis, &mut workspace, vertex).expect("a free handle");
+    }
+    let start = handles.targets()[0];
+    let mut weights = vec![0.0; basis.component_count()];
+    let run = move |round: usize| {
+        let mut controls = Controls::resume(basis, &mut weights).expect("a weight a component");
+        let mut target = start;
+        target[round % 3] += 0.05 * (0.3 * round as f32).sin();
+        handles.set_target(vertices[0], target).expect("a held vertex");
+        let drag = Drag {
+            basis,
+            handles: &mut handles,
+            controls: &mut controls,
+        };
+        drag.run(&mut workspace).expect("weights in range");
+    };
+    Contender {
+        name: format!("drag update, {kernels:?}, {held} held"),
+        is_yardstick: false,
+        run: Box::new(run),
+    }
+}
+
 /// Exponential map, right-hand side, solve, scatter: the frame behind the blend.
 fn solve_path<'c>(basis: &'c Basis<'c>, kernels: Kernels) -> Contender<'c> {
-    let mut workspace = workspace(basis, kernels);
+    let mut workspace = workspace(basis, TierChoice::Exact, kernels);
     let features: Vec<[f32; 9]> = (0..basis.vertex_count())
         .map(|v| core::array::from_fn(|c| 0.3 * (0.01 * v as f32 + c as f32).sin()))
         .collect();
@@ -115,6 +161,36 @@ fn solve_path<'c>(basis: &'c Basis<'c>, kernels: Kernels) -> Contender<'c> {
     }
 }
 
+/// The steps of a frame one by one, all components active.
+fn steps<'c>(basis: &'c Basis<'c>, kernels: Kernels) -> [Contender<'c>; 4] {
+    type Step = fn(&Basis<'_>, &mut Workspace<'_>, &mut [[f32; 3]]) -> Result<(), FrameError>;
+    let steps: [(&str, Step); 4] = [
+        ("decode", |basis, workspace, _| steps::decode(basis, workspace)),
+        ("right-hand side", |basis, workspace, _| steps::force(basis, workspace)),
+        ("solve", |basis, workspace, _| steps::solve(basis, workspace)),
+        ("scatter, bounding box", steps::scatter),
+    ];
+    steps.map(|(name, step)| {
+        let mut workspace = workspace(basis, TierChoice::Exact, kernels);
+        let pose = Subject::pose(basis.component_count(), basis.component_count(), 1);
+        let mut weights = pose.clone();
+        let mut positions = vec![[0.0; 3]; basis.vertex_count()];
+        let controls = Controls::resume(basis, &mut weights).expect("a weight a component");
+        let frame = Frame {
+            basis,
+            controls: &controls,
+            positions: &mut positions,
+            normals: None,
+        };
+        frame.run(&mut workspace).expect("weights in range");
+        Contender {
+            name: format!("step: {name}, {kernels:?}"),
+            is_yardstick: false,
+            run: Box::new(move |_| step(basis, &mut workspace, &mut positions).expect("an exact workspace")),
+        }
+    })
+}
+
 fn normals<'c>(basis: &'c Basis<'c>) -> Contender<'c> {
     let positions: Vec<[f32; 3]> = basis
         .lane_from_vertex()
@@ -122,7 +198,7 @@ fn normals<'c>(basis: &'c Basis<'c>) -> Contender<'c> {
         .map(|&lane| basis.rest_positions()[lane as usize])
         .collect();
     let mut normals = positions.clone();
-    let mut workspace = workspace(basis, Kernels::detect());
+    let mut workspace = workspace(basis, TierChoice::Exact, Kernels::detect());
     let run = move |_| {
         let job = Normals {
             basis,

@@ -3,7 +3,7 @@
 //!
 //! Every contender of a subject takes its turn in every round, so that a slow moment of the machine hits all alike; what is
 //! quoted is the median CPU time of one thread, and its ratio to the fastest dense loop over 60 morph targets. Arguments:
-//! `quick` for fewer rounds, any other word for the subjects whose names hold it. `SINEW_DATA` names a folder of sequences: its
+//! `quick` for fewer rounds, `tail` for ten thousand, any other word for the subjects whose names hold it. `SINEW_DATA` names a folder of sequences: its
 //! horse is then played instead of the creature; `SINEW_PACKAGE` names a trained compact package to play besides.
 
 mod contenders;
@@ -17,16 +17,21 @@ use sinew_runtime::Kernels;
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
-    let quick = words.iter().any(|word| word == "quick");
+    let has = |name: &str| words.iter().any(|word| word == name);
+    let settings = match (has("quick"), has("tail")) {
+        (true, _) => Settings::QUICK,
+        (_, true) => Settings::TAIL,
+        _ => Settings::FULL,
+    };
     let wanted = |subject: &str| {
         words
             .iter()
-            .all(|word| word == "quick" || subject.contains(word.as_str()))
+            .all(|word| word == "quick" || word == "tail" || subject.contains(word.as_str()))
     };
     println!("kernels of this machine: {:?}", Kernels::detect());
     for (name, make) in subjects() {
         if wanted(&name) {
-            play(&make(), if quick { Settings::QUICK } else { Settings::FULL });
+            play(&make(), settings);
         }
     }
 }

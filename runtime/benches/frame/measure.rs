@@ -22,6 +22,11 @@ impl Settings {
         warm_rounds: 2000,
         cold_rounds: 60,
     };
+    /// A tail to be quoted.
+    pub const TAIL: Self = Self {
+        warm_rounds: 10_000,
+        cold_rounds: 20,
+    };
     /// Medians need hundreds.
     pub const QUICK: Self = Self {
         warm_rounds: 200,

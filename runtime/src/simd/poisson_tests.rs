@@ -8,7 +8,7 @@ use crate::fixture::{DenseFactor, Grid, factorise};
 use crate::simd::Kernels;
 use crate::simd::lanes::Gradient;
 use crate::simd::scalar::naive::{Noise, largest_difference};
-use crate::simd::scalar::poisson::{BLOCK, Block, FLUSH_BELOW, Lane, Rings, adjoint_row};
+use crate::simd::scalar::poisson::{BLOCK, Block, FLUSH_BELOW, Lane, Rings};
 use crate::solve::{right_hand_side, substitute};
 
 /// Roundings of a sum of a dozen products near one.
@@ -220,33 +220,5 @@ fn an_edgeless_mesh_has_no_force() {
         let mut b = [[9.0; 4]; 2];
         right_hand_side(kernels, &rings, &[[1.0; 3]; 2], &[[[1.0; 4]; 3]; 2], &mut b);
         assert_eq!(b, [[0.0; 4]; 2], "{kernels:?}");
-    }
-}
-
-#[test]
-fn adjoint_rows_are_rows_of_the_inverse() {
-    let (grid, _, factor) = system(7, 6);
-    let factor = factor.view();
-    for node in [0, 13, 41] {
-        let mut row = vec![9.0; grid.vertex_count().next_multiple_of(BLOCK)];
-        adjoint_row(&factor, node, &mut row);
-        assert!(row[..node / BLOCK * BLOCK].iter().all(|value| *value == 0.0));
-        // Against the full solve, whose last step turns `y = F^-1 b` into the solution: row times y is one entry of it.
-        let force = lanes(&mut Noise::new(node as u64), grid.vertex_count());
-        let mut y = widened(&force);
-        for column in 0..force.len() {
-            for (below, tile) in factor.column(column) {
-                for n in 0..BLOCK * BLOCK {
-                    for c in 0..3 {
-                        y[BLOCK * below + n / BLOCK][c] -= f64::from(tile[n]) * y[BLOCK * column + n % BLOCK][c];
-                    }
-                }
-            }
-        }
-        let found: f64 = row.iter().zip(&y).map(|(value, y)| f64::from(*value) * y[0]).sum();
-        let mut x = force;
-        substitute(Kernels::Scalar, &factor, &mut x);
-        let expected = f64::from(x.as_flattened()[node][0]);
-        assert!((found - expected).abs() < SOLVE_TOLERANCE, "{node}: {found} {expected}");
     }
 }

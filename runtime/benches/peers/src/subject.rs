@@ -9,7 +9,7 @@ use sinew_formats::package::{
 };
 
 use sinew_bake::mesh::{cotangent::EdgeWeights, topology::Topology, widened};
-use sinew_bake::{Surface, bake};
+use sinew_bake::{BakeOptions, Surface, bake, bake_with};
 use sinew_synthesize::{Settings, Subject as Sequence};
 
 /// Coarse components.
@@ -18,6 +18,8 @@ const COARSE: usize = 10;
 const FINE: usize = 5;
 /// All components.
 pub const COMPONENTS: usize = COARSE + COARSE * FINE;
+/// Larger meshes are baked without a fast tier.
+const FAST_VERTICES_MAX: usize = 13_000;
 /// Share of the vertices that a coarse component moves, and a fine one: 10 * 0.25 + 50 * 0.09 = 7 entries a vertex.
 const SHARES: [f64; 2] = [0.25, 0.09];
 
@@ -64,7 +66,13 @@ impl Subject {
     /// A compact package, for instance a trained one.
     pub fn of_package(name: String, compact: AlignedBytes) -> Self {
         let view = CompactView::open(&compact).expect("a sound package");
-        let baked = bake(&view).expect("a mesh that can be baked");
+        // The fast tier is fitted to hundreds of poses, which takes too long on the largest.
+        let baked = if view.vertex_count() <= FAST_VERTICES_MAX {
+            bake_with(&view, &BakeOptions::default())
+        } else {
+            bake(&view)
+        };
+        let baked = baked.expect("a mesh that can be baked");
         Self {
             name,
             rest: view.rest_positions().to_vec(),

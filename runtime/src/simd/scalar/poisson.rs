@@ -133,29 +133,3 @@ fn add_scaled(block: &mut Block, entries: &[f32; BLOCK], other: &Lane, sign: f32
         }
     }
 }
-
-/// The row of `F^-1` transposed that belongs to a node, times the inverse of D: with `y = F^-1 b`, the solution at `node`
-/// is `sum_n row_n y_n`. Zero but for the node's ancestors in the elimination. Shape: `row` `[4 T]`.
-#[allow(dead_code, reason = "for handles, which linearise the solve at single nodes")]
-pub(crate) fn adjoint_row(factor: &Factor<'_>, node: usize, row: &mut [f32]) {
-    let (blocks, _) = row.as_chunks_mut::<BLOCK>();
-    blocks.fill([0.0; BLOCK]);
-    blocks[node / BLOCK][node % BLOCK] = 1.0;
-    for column in node / BLOCK..blocks.len() {
-        let own = blocks[column].map(flushed);
-        let product = |tile: &[f32; 16]| -> [f32; BLOCK] {
-            let rows = tile.as_chunks::<BLOCK>().0;
-            core::array::from_fn(|r| rows[r].iter().zip(&own).map(|(value, x)| value * x).sum())
-        };
-        blocks[column] = product(&factor.inverse_diagonals[column]);
-        if own == [0.0; BLOCK] {
-            continue;
-        }
-        for (below, tile) in factor.column(column) {
-            let change = product(tile);
-            for r in 0..BLOCK {
-                blocks[below][r] -= change[r];
-            }
-        }
-    }
-}

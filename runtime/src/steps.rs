@@ -1,0 +1,66 @@
+//! The steps of an exact frame, each alone, on the workspace of a pose: for benchmarks, which time them, and for nobody
+//! else; hidden from the documentation and free to change. The pose of the workspace is spent by them.
+
+use crate::basis::Basis;
+use crate::decode::Decoded;
+use crate::error::{Buffer, FrameError};
+use crate::normals::check_length;
+use crate::solve::{emit, right_hand_side, substitute};
+use crate::workspace::Workspace;
+
+/// Blend, tanh and exponential map of all components of the pose.
+///
+/// # Errors
+/// [`FrameError::ForeignWorkspace`], [`FrameError::NeedsExactTier`]; so for all steps.
+pub fn decode(basis: &Basis<'_>, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
+    workspace.validate_exact(basis)?;
+    let decoded = Decoded {
+        shares: workspace.shares,
+        blocks: workspace.blocks,
+        gradients: workspace.gradients,
+    };
+    decoded.update(&basis.exact(), workspace.kernels, workspace.weights, true);
+    Ok(())
+}
+
+/// The right-hand side of the pose's gradients, into the scratch of the solve.
+///
+/// # Errors
+/// Those of [`decode`].
+pub fn force(basis: &Basis<'_>, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
+    workspace.validate_exact(basis)?;
+    let tier = basis.exact();
+    right_hand_side(
+        workspace.kernels,
+        &tier.rings(),
+        tier.rest_positions(),
+        workspace.gradients,
+        workspace.solution,
+    );
+    Ok(())
+}
+
+/// Solves with the factor for the three columns in the scratch, which it first sets to ones, as a solver is given new ones.
+///
+/// # Errors
+/// Those of [`decode`].
+pub fn solve(basis: &Basis<'_>, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
+    workspace.validate_exact(basis)?;
+    workspace.solution[..basis.vertex_count()].fill([1.0, 1.0, 1.0, 0.0]);
+    substitute(
+        workspace.kernels,
+        &basis.exact().factor(),
+        workspace.solution.as_chunks_mut().0,
+    );
+    Ok(())
+}
+
+/// Positions in source order and the bounding box. Shape: `positions` `[V]`.
+///
+/// # Errors
+/// Those of [`decode`], and of a pose that left f32.
+pub fn scatter(basis: &Basis<'_>, workspace: &mut Workspace<'_>, positions: &mut [[f32; 3]]) -> Result<(), FrameError> {
+    workspace.validate_exact(basis)?;
+    check_length(basis, Buffer::Positions, positions.len())?;
+    emit(basis, workspace.displacement, workspace.posed, positions).1
+}
