@@ -7,6 +7,7 @@
 //! Index letters everywhere: `v` vertex, `f` face, `k` component, `l` level, `m` shape, `c` coordinate.
 
 pub mod baselines;
+pub mod compare;
 pub mod components;
 pub mod config;
 pub mod evaluate;

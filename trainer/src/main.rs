@@ -43,6 +43,8 @@ enum Command {
     Train(commands::train::TrainArguments),
     /// Measure a package on the shapes it was not trained on
     Evaluate(commands::evaluate::EvaluateArguments),
+    /// Measure this project beside the systems of the literature, trained on the same shapes
+    Compare(commands::compare::CompareArguments),
     /// Show what is in a package: the tree of components, sizes, where it comes from
     Inspect(commands::inspect::InspectArguments),
     /// Write one pose as a mesh
@@ -61,6 +63,7 @@ fn main() -> ExitCode {
     let outcome = match cli.command {
         Command::Train(arguments) => commands::train::run(&arguments, &console),
         Command::Evaluate(arguments) => commands::evaluate::run(&arguments, &console),
+        Command::Compare(arguments) => commands::compare::run(&arguments, &console),
         Command::Inspect(arguments) => commands::inspect::run(&arguments),
         Command::Frame(arguments) => commands::frame::run(&arguments, &console),
         Command::Bake(arguments) => commands::bake::run(&arguments, &console),

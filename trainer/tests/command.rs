@@ -196,3 +196,71 @@ fn input_that_cannot_be_used_is_named() {
     refused(&["synthesize", "flag", "-o", &at("tiny"), "--vertices", "3"], &["3"]);
     assert!(!Path::new(&out).exists());
 }
+
+#[test]
+fn methods_are_compared_on_one_split() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let at = |name: &str| path(folder.path(), name);
+    run(&[
+        "synthesize",
+        "bar",
+        "-o",
+        &at("bar"),
+        "--frames",
+        "9",
+        "--vertices",
+        "120",
+        "-q",
+    ]);
+    std::fs::write(at("small.toml"), SMALL).expect("a file in the temporary folder");
+    let (config, model) = (at("small.toml"), at("bar.sinew"));
+    run(&[
+        "train",
+        &at("bar"),
+        "-o",
+        &model,
+        "--train-every",
+        "3",
+        "--config",
+        &config,
+        "-q",
+    ]);
+    let common = ["--components", "6", "--epochs", "5", "--quick", "-q"];
+    let (json, report) = (at("all.json"), at("report"));
+    let bar = at("bar");
+    let mut arguments = vec![
+        "compare",
+        &bar,
+        "--train-every",
+        "3",
+        "--ours",
+        &model,
+        "--json",
+        &json,
+        "--report",
+        &report,
+    ];
+    arguments.extend(common);
+    let table = run(&arguments);
+    assert!(
+        table.contains("SPLOCS on features") && table.contains("E_rms"),
+        "{table}"
+    );
+    let text = std::fs::read_to_string(&json).expect("figures were written");
+    let figures: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let last = figures["methods"]
+        .as_array()
+        .and_then(|methods| methods.last())
+        .expect("methods");
+    assert_eq!(last["name"], "Sinew");
+    assert!(
+        last["training_seconds"].is_null() && last["projections"][0]["e_rms"].is_number(),
+        "{last}"
+    );
+    assert!(folder.path().join("report/index.html").exists());
+    // Another split would not be the same test.
+    refused(
+        &["compare", &bar, "--train-every", "4", "--ours", &model, "-q"],
+        &["trained on other shapes", "--train-every"],
+    );
+}

@@ -1,3 +1,13 @@
 //! The peers, trained on the same shapes, for the same table.
+//!
+//! Path of data: training shapes -> one file a method -> [`linear::LinearBasis`] -> [`model::Model`], which
+//! [`crate::compare`] fits to unseen shapes, scores, and moves by handles.
 
+pub mod bernard;
+pub mod gradient_field;
+pub mod huang;
+pub mod linear;
+pub mod model;
 pub mod pca;
+pub mod splocs;
+pub mod tan;

@@ -4,6 +4,7 @@
 use nalgebra::{DMatrix, SymmetricEigen};
 use rayon::prelude::*;
 
+use super::linear::LinearBasis;
 use crate::features::reconstruct::PoissonSystem;
 
 /// Variances below this share of the greatest are rounding: N shapes span at most N - 1 directions about their mean.
@@ -56,6 +57,15 @@ impl PrincipalComponents {
             })
             .collect();
         Self { mean, directions }
+    }
+
+    /// The same as a linear basis, values of `width` numbers an element.
+    pub fn into_basis(self, width: usize) -> LinearBasis {
+        LinearBasis {
+            width,
+            mean: self.mean,
+            directions: self.directions,
+        }
     }
 
     /// K found.

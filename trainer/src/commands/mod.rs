@@ -1,6 +1,7 @@
 //! The subcommands, one file each, and what they share: how they fail, how they read sequences and packages.
 
 pub mod bake;
+pub mod compare;
 pub mod console;
 pub mod demo;
 pub mod evaluate;

@@ -97,6 +97,23 @@ impl FeatureDecoder {
             .collect()
     }
 
+    /// K.
+    pub fn component_count(&self) -> usize {
+        self.component_count
+    }
+
+    /// Derivative of the features at `weights`, vertices without one left out. Shape: `[K]`, source order, network units.
+    pub fn derivatives(&self, weights: &[f64]) -> Vec<Vec<(u32, [f64; FEATURE_COUNT])>> {
+        let mut derivatives = vec![Vec::new(); self.component_count];
+        for v in 0..self.offsets.len() - 1 {
+            self.decode(v, weights, |entry, slope| {
+                let derivative = core::array::from_fn(|c| slope[c] * f64::from(entry.value[c]));
+                derivatives[entry.component as usize].push((v as u32, derivative));
+            });
+        }
+        derivatives
+    }
+
     /// Weights that minimise `sum_v areas_v |X_v - Xhat_v(z)|^2`, from `start` (the encoder's). Shapes: `features` and
     /// `areas` `[V]`, source order; `start` `[K]`. Stretch counts as it stands in network units, already down-weighted.
     pub fn project(&self, features: &[[f32; FEATURE_COUNT]], areas: &[f64], start: Vec<f64>) -> Vec<f64> {

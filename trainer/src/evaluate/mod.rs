@@ -4,7 +4,7 @@
 //! positions -> [`score`] -> [`Evaluation`].
 
 mod ball;
-mod descent;
+pub(crate) mod descent;
 mod encoder;
 mod erms;
 mod evaluation;
@@ -22,6 +22,7 @@ pub use evaluation::{
 pub use feature_projection::FeatureDecoder;
 pub use player::{PlayError, Player};
 pub use position_projection::project_positions;
+pub(crate) use position_projection::{gram_matrix, remove_directions, rigid_directions};
 pub use scores::{ScoreError, Scores, score};
 pub use sted::{Sted, sted};
 

@@ -94,7 +94,7 @@ impl LeastSquares for PositionMisfit<'_, '_> {
 
 /// Orthonormal displacements that translate and turn `positions`: a motion of the whole is no error, so no weight should
 /// work against it. Up to six; fewer where the positions have no extent.
-fn rigid_directions(positions: &[[f64; 3]]) -> Vec<Vec<[f64; 3]>> {
+pub(crate) fn rigid_directions(positions: &[[f64; 3]]) -> Vec<Vec<[f64; 3]>> {
     let vertex_count = positions.len() as f64;
     let mut centre = [0.0; 3];
     for position in positions {
@@ -131,7 +131,7 @@ fn rigid_directions(positions: &[[f64; 3]]) -> Vec<Vec<[f64; 3]>> {
     directions
 }
 
-fn remove_directions(directions: &[Vec<[f64; 3]>], column: &mut [[f32; 3]]) {
+pub(crate) fn remove_directions(directions: &[Vec<[f64; 3]>], column: &mut [[f32; 3]]) {
     for direction in directions {
         let pairs = column.as_flattened().iter().zip(direction.as_flattened());
         let share: f64 = pairs.map(|(&x, d)| f64::from(x) * d).sum();
@@ -150,7 +150,7 @@ fn norm(a: &[[f64; 3]]) -> f64 {
 }
 
 /// `J^T J`, lower triangle. Chunk by chunk, so that a chunk of all columns stays in cache.
-fn gram_matrix(columns: &[Vec<[f32; 3]>]) -> DMatrix<f64> {
+pub(crate) fn gram_matrix(columns: &[Vec<[f32; 3]>]) -> DMatrix<f64> {
     let mut matrix = DMatrix::zeros(columns.len(), columns.len());
     let row_count = columns.first().map_or(0, |column| column.as_flattened().len());
     for first in (0..row_count).step_by(CHUNK) {

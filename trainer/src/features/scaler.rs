@@ -66,7 +66,8 @@ impl FeatureScaler {
             .collect()
     }
 
-    fn scales(&self) -> [f64; 9] {
+    /// Feature units in one network unit, in the order of a feature.
+    pub fn scales(&self) -> [f64; 9] {
         core::array::from_fn(|c| f64::from(if c < 3 { self.rotation_scale } else { self.stretch_scale }))
     }
 }

@@ -142,6 +142,11 @@ impl Prepared {
         found.as_ref().clone()
     }
 
+    /// Up to `count` vertices spread over the surface, the anchor first.
+    pub fn spread_vertices(&self, count: usize) -> Vec<usize> {
+        self.heat.farthest_points(self.system.anchor(), count)
+    }
+
     /// The mesh and scales as the package wants them.
     pub fn basis_frame(&self) -> BasisFrame {
         BasisFrame {

@@ -137,57 +137,21 @@ pub enum ReportError {
 impl Report {
     /// The page as text. Errors: a picture that cannot be encoded.
     pub fn render(&self) -> Result<String, ReportError> {
-        let mut page = format!(
-            "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-             <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
-             <title>{title}</title><style>{style}</style></head><body><main><h1>{title}</h1><p class=\"lead\">{intro}</p>",
-            title = escape(&self.title),
-            style = include_str!("report.css"),
-            intro = escape(&self.intro)
-        );
-        self.write_facts(&mut page);
+        let mut page = page_head(&self.title, &self.intro);
+        write_facts(&mut page, &self.facts);
         self.write_samples(&mut page)?;
         self.write_tree(&mut page)?;
         self.write_comparisons(&mut page)?;
         self.write_errors(&mut page);
         self.write_curve(&mut page);
         self.write_end(&mut page);
-        page.push_str("</main></body></html>\n");
+        page.push_str(PAGE_END);
         Ok(page)
     }
 
     /// Renders and writes the page: to a temporary name in the same folder first. Errors: as [`Report::render`], and unwritable paths.
     pub fn write(&self, path: &Path) -> Result<(), ReportError> {
-        let page = self.render()?;
-        let folder = path
-            .parent()
-            .filter(|folder| !folder.as_os_str().is_empty())
-            .unwrap_or(Path::new("."));
-        let store = || -> std::io::Result<()> {
-            let mut builder = tempfile::Builder::new();
-            // Temporary files are private by default; a report is to be read by others, as far as the umask lets them.
-            #[cfg(unix)]
-            builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-            let mut file = builder.tempfile_in(folder)?;
-            file.write_all(page.as_bytes())?;
-            file.persist(path).map_err(|error| error.error)?;
-            Ok(())
-        };
-        store().map_err(|source| ReportError::Write {
-            path: path.to_owned(),
-            source,
-        })
-    }
-
-    fn write_facts(&self, page: &mut String) {
-        if self.facts.is_empty() {
-            return;
-        }
-        page.push_str("<dl class=\"facts\">");
-        for (name, value) in &self.facts {
-            let _ = write!(page, "<div><dt>{}</dt><dd>{}</dd></div>", escape(name), escape(value));
-        }
-        page.push_str("</dl>");
+        write_page(&self.render()?, path)
     }
 
     fn write_samples(&self, page: &mut String) -> Result<(), ReportError> {
@@ -397,7 +361,55 @@ impl Report {
     }
 }
 
-fn section(page: &mut String, title: &str, words: &str) {
+/// What ends every page.
+pub(super) const PAGE_END: &str = "</main></body></html>\n";
+
+/// Everything up to the first section.
+pub(super) fn page_head(title: &str, intro: &str) -> String {
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+         <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
+         <title>{title}</title><style>{style}</style></head><body><main><h1>{title}</h1><p class=\"lead\">{intro}</p>",
+        title = escape(title),
+        style = include_str!("report.css"),
+        intro = escape(intro)
+    )
+}
+
+pub(super) fn write_facts(page: &mut String, facts: &[(String, String)]) {
+    if facts.is_empty() {
+        return;
+    }
+    page.push_str("<dl class=\"facts\">");
+    for (name, value) in facts {
+        let _ = write!(page, "<div><dt>{}</dt><dd>{}</dd></div>", escape(name), escape(value));
+    }
+    page.push_str("</dl>");
+}
+
+/// Writes a page: to a temporary name in the same folder first. Errors: unwritable paths.
+pub(super) fn write_page(page: &str, path: &Path) -> Result<(), ReportError> {
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    let store = || -> std::io::Result<()> {
+        let mut builder = tempfile::Builder::new();
+        // Temporary files are private by default; a report is to be read by others, as far as the umask lets them.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        let mut file = builder.tempfile_in(folder)?;
+        file.write_all(page.as_bytes())?;
+        file.persist(path).map_err(|error| error.error)?;
+        Ok(())
+    };
+    store().map_err(|source| ReportError::Write {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+pub(super) fn section(page: &mut String, title: &str, words: &str) {
     let _ = write!(
         page,
         "<h2>{}</h2><p class=\"why\">{}</p>",
@@ -406,7 +418,7 @@ fn section(page: &mut String, title: &str, words: &str) {
     );
 }
 
-fn legend(page: &mut String, map: ColorMap, from: &str, to: &str) {
+pub(super) fn legend(page: &mut String, map: ColorMap, from: &str, to: &str) {
     let _ = write!(
         page,
         "<div class=\"legend\"><span>{}</span><i style=\"background:{}\"></i><span>{}</span></div>",
@@ -416,7 +428,7 @@ fn legend(page: &mut String, map: ColorMap, from: &str, to: &str) {
     );
 }
 
-fn img(image: &Image, alt: &str) -> Result<String, ReportError> {
+pub(super) fn img(image: &Image, alt: &str) -> Result<String, ReportError> {
     Ok(format!(
         "<img src=\"{}\" width=\"{}\" height=\"{}\" loading=\"lazy\" alt=\"{}\">",
         image.data_uri()?,

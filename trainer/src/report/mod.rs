@@ -4,6 +4,7 @@
 //! self-contained file; the same input gives the same bytes.
 
 pub mod color;
+pub mod compare_page;
 pub mod html;
 pub mod illustrate;
 pub mod image;

@@ -15,6 +15,14 @@ pub struct Line {
 const SIZE: (f64, f64) = (760.0, 300.0);
 /// Room for labels: left, right, top, bottom.
 const MARGINS: (f64, f64, f64, f64) = (64.0, 18.0, 16.0, 44.0);
+/// Colours that the style sheet has for lines.
+const COLOR_COUNT: usize = 10;
+/// Lines that the legend has room for beside the name of the x axis; more go below, so many a row.
+const LEGEND_BESIDE_AXIS: usize = 3;
+/// See [`LEGEND_BESIDE_AXIS`].
+const LEGEND_PER_ROW: usize = 4;
+/// Height of a row of the legend, or of a bar.
+const ROW_HEIGHT: f64 = 20.0;
 /// Points drawn of one line; more would not be seen.
 const POINT_COUNT_MAX: usize = 600;
 
@@ -39,10 +47,15 @@ pub fn log_chart(lines: &[Line], x_name: &str, y_name: &str) -> String {
     let x_of = |x: f64| left + (x - x_low) / x_range * (SIZE.0 - left - right);
     let y_of = |y: f64| top + (high - y.log10()) / (high - low) * (SIZE.1 - top - bottom);
 
+    let legend_rows = if lines.len() > LEGEND_BESIDE_AXIS {
+        lines.len().div_ceil(LEGEND_PER_ROW)
+    } else {
+        0
+    };
     let mut svg = format!(
         "<svg class=\"chart\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{} over {}\">",
         SIZE.0,
-        SIZE.1,
+        SIZE.1 + ROW_HEIGHT * legend_rows as f64,
         escape(y_name),
         escape(x_name)
     );
@@ -86,19 +99,82 @@ pub fn log_chart(lines: &[Line], x_name: &str, y_name: &str) -> String {
         let _ = write!(
             svg,
             "<polyline class=\"line l{}\" points=\"{}\"/>",
-            i % 4,
+            i % COLOR_COUNT,
             path.join(" ")
         );
-        let x = left + 12.0 + 150.0 * i as f64;
+        let (x, base) = if legend_rows > 0 {
+            let row = (i / LEGEND_PER_ROW) as f64;
+            (
+                12.0 + (SIZE.0 - 12.0) / LEGEND_PER_ROW as f64 * (i % LEGEND_PER_ROW) as f64,
+                SIZE.1 + ROW_HEIGHT * (row + 0.5),
+            )
+        } else {
+            (left + 12.0 + 150.0 * i as f64, SIZE.1 - 6.0)
+        };
         let _ = write!(
             svg,
             "<line class=\"line l{}\" x1=\"{x}\" x2=\"{}\" y1=\"{y}\" y2=\"{y}\"/><text class=\"axis\" x=\"{}\" y=\"{}\">{}</text>",
-            i % 4,
+            i % COLOR_COUNT,
             x + 18.0,
             x + 24.0,
-            SIZE.1 - 6.0,
+            base,
             escape(&line.name),
-            y = SIZE.1 - 10.0
+            y = base - 4.0
+        );
+    }
+    svg.push_str("</svg>");
+    svg
+}
+
+/// One bar of [`bar_chart`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bar {
+    /// What stands before it.
+    pub name: String,
+    /// Its length. Bars that are not finite, or negative, are left out.
+    pub value: f64,
+    /// Number of its colour.
+    pub color: usize,
+}
+
+/// Horizontal bars from zero, each with its number; empty where there is none to draw.
+pub fn bar_chart(bars: &[Bar], name: &str) -> String {
+    let bars: Vec<&Bar> = bars
+        .iter()
+        .filter(|bar| bar.value.is_finite() && bar.value >= 0.0)
+        .collect();
+    let most = bars.iter().map(|bar| bar.value).fold(0.0, f64::max);
+    if bars.is_empty() {
+        return String::new();
+    }
+    let (label_width, number_width) = (250.0, 70.0);
+    let scale = if most > 0.0 {
+        (SIZE.0 - label_width - number_width) / most
+    } else {
+        0.0
+    };
+    let mut svg = format!(
+        "<svg class=\"chart\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">",
+        SIZE.0,
+        ROW_HEIGHT * (bars.len() + 1) as f64,
+        escape(name)
+    );
+    for (row, bar) in bars.iter().enumerate() {
+        let y = ROW_HEIGHT * (row as f64 + 0.5);
+        let length = scale * bar.value;
+        let _ = write!(
+            svg,
+            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>\
+             <rect class=\"bar b{}\" x=\"{label_width}\" y=\"{:.1}\" width=\"{length:.1}\" height=\"12\" rx=\"2\"/>\
+             <text class=\"tick\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
+            label_width - 10.0,
+            y + 14.0,
+            escape(&bar.name),
+            bar.color % COLOR_COUNT,
+            y + 4.0,
+            label_width + length + 8.0,
+            y + 14.0,
+            number(bar.value)
         );
     }
     svg.push_str("</svg>");

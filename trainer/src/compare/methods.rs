@@ -1,0 +1,457 @@
+//! Every method in turn: train, fit unseen shapes, score.
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+use sinew_formats::package::{AlignedBytes, BakedView, CompactView};
+
+use super::bench::{Bench, narrowed};
+use super::fitting::{project_linear, project_positions, weights_from_handles};
+use super::{
+    CompareError, CompareInput, ComparedShapes, Comparison, HANDLE_COUNTS, Method, Projection, ProjectionKind,
+    two_levels,
+};
+use crate::bake::bake;
+use crate::baselines::bernard::bernard;
+use crate::baselines::gradient_field::{FaceField, GradientField};
+use crate::baselines::huang::{face_features, huang};
+use crate::baselines::linear::{LinearBasis, LinearProjection};
+use crate::baselines::model::{GradientModel, Model, PositionModel};
+use crate::baselines::pca::PrincipalComponents;
+use crate::baselines::splocs::{SplocsSettings, splocs};
+use crate::baselines::tan::{TanSettings, train};
+use crate::components::position_modes::keep_linear_algebra_serial;
+use crate::evaluate::{EvaluationError, EvaluationInput, FeatureDecoder, NormalisedPair, Scores, evaluate, score};
+use crate::features::scaler::FeatureScaler;
+use crate::learn::prepare::Prepared;
+use crate::learn::{LearnError, Reporter, RunOptions, learn};
+
+/// Unseen shapes moved by control points.
+const HANDLE_SHAPES: usize = 8;
+/// First learning rate of the one-level autoencoder, as published.
+const TAN_RATE: f32 = 1e-3;
+/// Relative size below which a shape does not move: the missed share of its energy means nothing.
+const STILL: f64 = 1e-12;
+
+const SPLOCS_SOURCE: &str = "Neumann et al. 2013";
+
+/// Compares. The same figures for any number of threads, times excepted.
+/// Errors: a split that leaves nothing to learn from or to measure, a package of another mesh or split, a wish to stop.
+pub fn compare(input: CompareInput<'_>, reporter: &dyn Reporter) -> Result<(Comparison, ComparedShapes), CompareError> {
+    keep_linear_algebra_serial();
+    let bench = Bench::new(input, reporter)?;
+    let settings = input.settings;
+    let vertices = bench.prepared.rest.len();
+    let count = settings.component_count;
+    let handles = if settings.quick {
+        Vec::new()
+    } else {
+        bench.prepared.spread_vertices(HANDLE_COUNTS[HANDLE_COUNTS.len() - 1])
+    };
+    let mut run = Run {
+        control_points: HANDLE_COUNTS
+            .iter()
+            .copied()
+            .filter(|&count| count <= handles.len())
+            .collect(),
+        handles,
+        methods: Vec::new(),
+        reconstructions: Vec::new(),
+        round_trip: None,
+        bench: &bench,
+        reporter,
+    };
+    let distances = |v: usize| bench.prepared.distances(v);
+
+    run.positions("PCA on positions", "Alexa and Müller 2000", || {
+        let flat: Vec<Vec<f64>> = bench.train.iter().map(|shape| shape.as_flattened().to_vec()).collect();
+        PrincipalComponents::fit(&flat, count).into_basis(3)
+    })?;
+    run.positions("SPLOCS on positions", SPLOCS_SOURCE, || {
+        let flat: Vec<Vec<f64>> = bench.train.iter().map(|shape| shape.as_flattened().to_vec()).collect();
+        splocs(&flat, 3, &distances, &SplocsSettings::published(count))
+    })?;
+
+    run.positions("Local factors", "Bernard et al. 2016", || {
+        let flat: Vec<Vec<f64>> = bench.train.iter().map(|shape| shape.as_flattened().to_vec()).collect();
+        let (topology, rest) = (&bench.prepared.topology, &bench.prepared.rest);
+        bernard(&flat, topology, rest, &distances, count)
+    })?;
+
+    let scales = bench.prepared.scaler.scales();
+    let own = Gradients {
+        field: &bench.prepared.system,
+        scales,
+        weights: &bench.areas,
+        train: &bench.train_features,
+        test: &bench.test_features,
+    };
+    run.gradients("PCA on features", "Alexa and Müller 2000", &own, |train| {
+        PrincipalComponents::fit(train, count).into_basis(9)
+    })?;
+    run.gradients("SPLOCS on features", SPLOCS_SOURCE, &own, |train| {
+        splocs(train, 9, &distances, &SplocsSettings::published(count))
+    })?;
+
+    let field = FaceField::new(&bench.prepared.topology, &bench.prepared.rest)?;
+    let read = |shapes: &[Vec<[f64; 3]>]| -> Vec<Vec<f64>> {
+        shapes.par_iter().map(|shape| face_features(&field, shape)).collect()
+    };
+    let faces = Gradients {
+        field: &field,
+        scales: [1.0; 9],
+        weights: &field.areas(),
+        train: &read(&bench.train),
+        test: &read(&bench.test),
+    };
+    run.gradients("Deformation gradients", "Huang et al. 2014", &faces, |train| {
+        huang(&field, train, &distances, count)
+    })?;
+    drop(faces);
+
+    run.one_level_autoencoder()?;
+    run.ours()?;
+
+    let round_trip = run
+        .round_trip
+        .ok_or(EvaluationError::Score(crate::evaluate::ScoreError::Nothing))?;
+    let shapes = ComparedShapes {
+        shapes: bench.test_shapes.clone(),
+        truth: bench.test.iter().map(|shape| narrowed(shape)).collect(),
+        reconstructions: run.reconstructions,
+    };
+    let comparison = Comparison {
+        sequence: input.sequence.name.clone(),
+        vertices,
+        train_shapes: bench.train.len(),
+        test_shapes: bench.test_shapes.len(),
+        components: count,
+        seed: settings.config.seed,
+        control_points: run.control_points,
+        round_trip,
+        methods: run.methods,
+    };
+    Ok((comparison, shapes))
+}
+
+/// Features of one kind, with the solve behind them.
+struct Gradients<'g> {
+    field: &'g dyn GradientField,
+    scales: [f64; 9],
+    /// Of elements.
+    weights: &'g [f64],
+    train: &'g [Vec<f64>],
+    test: &'g [Vec<f64>],
+}
+
+/// What a method found for the measured shapes, one way to find weights.
+struct Found {
+    kind: ProjectionKind,
+    shapes: Vec<Vec<[f32; 3]>>,
+    max_percentage_error: Option<f64>,
+}
+
+struct Trained<'m> {
+    name: &'m str,
+    source: &'m str,
+    training_seconds: Option<f64>,
+    package_bytes: Option<usize>,
+    /// Weights of the training shapes. Shape: `[1 + M][K]`.
+    train_weights: Vec<Vec<f64>>,
+}
+
+struct Run<'r, 'a> {
+    bench: &'r Bench<'a>,
+    reporter: &'r dyn Reporter,
+    handles: Vec<usize>,
+    control_points: Vec<usize>,
+    methods: Vec<Method>,
+    reconstructions: Vec<Vec<Vec<Vec<[f32; 3]>>>>,
+    round_trip: Option<Scores>,
+}
+
+impl Run<'_, '_> {
+    fn begin(&self, name: &str) -> Result<Instant, CompareError> {
+        if self.reporter.stop_requested() {
+            return Err(LearnError::Stopped.into());
+        }
+        self.reporter.stage(name, 1);
+        Ok(Instant::now())
+    }
+
+    fn positions(
+        &mut self,
+        name: &str,
+        source: &str,
+        factor: impl FnOnce() -> LinearBasis,
+    ) -> Result<(), CompareError> {
+        let started = self.begin(name)?;
+        let basis = factor();
+        let training_seconds = Some(started.elapsed().as_secs_f64());
+        let projection = LinearProjection::new(&basis, &vec![1.0; self.bench.prepared.rest.len()]);
+        let weights_of = |shapes: &[Vec<[f64; 3]>]| -> Vec<Vec<f64>> {
+            let shapes = shapes.par_iter();
+            shapes.map(|shape| project_linear(&basis, &projection, shape)).collect()
+        };
+        let model = PositionModel(basis.clone());
+        let posed = weights_of(&self.bench.test)
+            .par_iter()
+            .map(|w| narrowed(&model.pose(w)))
+            .collect();
+        let trained = Trained {
+            name,
+            source,
+            training_seconds,
+            package_bytes: None,
+            train_weights: weights_of(&self.bench.train),
+        };
+        let found = Found {
+            kind: ProjectionKind::Positions,
+            shapes: posed,
+            max_percentage_error: None,
+        };
+        self.finish(trained, &model, vec![found])
+    }
+
+    fn gradients(
+        &mut self,
+        name: &str,
+        source: &str,
+        gradients: &Gradients<'_>,
+        factor: impl FnOnce(&[Vec<f64>]) -> LinearBasis,
+    ) -> Result<(), CompareError> {
+        let started = self.begin(name)?;
+        let basis = factor(gradients.train);
+        let training_seconds = Some(started.elapsed().as_secs_f64());
+        let projection = LinearProjection::new(&basis, gradients.weights);
+        let weights: Vec<Vec<f64>> = gradients.test.par_iter().map(|x| projection.weights(x)).collect();
+        let missed = gradients.test.par_iter().zip(&weights).map(|(x, weights)| {
+            let nearest = basis.compose(weights);
+            let energy: f64 = x.iter().map(|x| x * x).sum();
+            let error: f64 = x.iter().zip(&nearest).map(|(x, y)| (x - y).powi(2)).sum();
+            if energy > STILL { error / energy } else { 0.0 }
+        });
+        let missed: Vec<f64> = missed.collect();
+        let model = GradientModel {
+            decoder: Box::new(basis.clone()),
+            field: gradients.field,
+            scales: gradients.scales,
+        };
+        let mut found = vec![Found {
+            kind: ProjectionKind::Features,
+            shapes: weights
+                .par_iter()
+                .map(|weights| narrowed(&model.pose(weights)))
+                .collect(),
+            max_percentage_error: Some(missed.into_iter().fold(0.0, f64::max)),
+        }];
+        if !self.bench.input.settings.quick {
+            let shapes = self.bench.test.par_iter().zip(weights);
+            let posed = shapes.map(|(shape, start)| {
+                let weights = project_positions(&model, shape, start);
+                narrowed(&model.pose(&weights))
+            });
+            found.push(Found {
+                kind: ProjectionKind::Positions,
+                shapes: posed.collect(),
+                max_percentage_error: None,
+            });
+        }
+        let trained = Trained {
+            name,
+            source,
+            training_seconds,
+            package_bytes: None,
+            train_weights: gradients.train.iter().map(|x| projection.weights(x)).collect(),
+        };
+        self.finish(trained, &model, found)
+    }
+
+    fn one_level_autoencoder(&mut self) -> Result<(), CompareError> {
+        let CompareInput {
+            sequence,
+            train_shapes,
+            settings,
+            ..
+        } = self.bench.input;
+        let tan = TanSettings {
+            component_count: settings.component_count,
+            epochs: settings.epochs,
+            rate: TAN_RATE,
+            seed: settings.config.seed,
+        };
+        let config = tan.config(&settings.config);
+        let prepared = Prepared::new(sequence, train_shapes, &config, self.reporter)?;
+        let name = "One-level autoencoder";
+        self.begin(name)?;
+        self.reporter.stage(name, settings.epochs as u64);
+        let started = Instant::now();
+        let package = train(
+            &prepared,
+            &config,
+            &tan,
+            &sequence.name,
+            train_shapes,
+            sequence.shape_count(),
+            self.reporter,
+        )?;
+        self.package(name, "Tan et al. 2018", &package, Some(started.elapsed().as_secs_f64()))
+    }
+
+    fn ours(&mut self) -> Result<(), CompareError> {
+        let CompareInput {
+            sequence,
+            train_shapes,
+            settings,
+            ours,
+        } = self.bench.input;
+        let (name, source) = ("Sinew", "two levels, this project");
+        if let Some(package) = ours {
+            return self.package(name, source, package, None);
+        }
+        self.begin(name)?;
+        let mut config = settings.config.clone();
+        config.components = two_levels(settings.component_count);
+        let started = Instant::now();
+        let learned = learn(sequence, train_shapes, &config, &RunOptions::default(), self.reporter)?;
+        self.package(name, source, &learned.package, Some(started.elapsed().as_secs_f64()))
+    }
+
+    fn package(
+        &mut self,
+        name: &str,
+        source: &str,
+        package: &[u8],
+        training_seconds: Option<f64>,
+    ) -> Result<(), CompareError> {
+        let bench = self.bench;
+        let view = CompactView::open(package).map_err(EvaluationError::from)?;
+        self.reporter.stage(name, bench.test_shapes.len() as u64);
+        let input = EvaluationInput {
+            package,
+            sequence: bench.input.sequence,
+            test_shapes: &bench.test_shapes,
+            settings: bench.input.settings.config.features,
+        };
+        let (evaluation, shapes) = evaluate(&input, &|done| self.reporter.advance(done as u64, ""))?;
+        self.round_trip = Some(evaluation.round_trip);
+        let baked: AlignedBytes = bake(&view).map_err(EvaluationError::from)?;
+        let decoder = FeatureDecoder::new(&BakedView::open(&baked).map_err(EvaluationError::from)?);
+        let scaler = FeatureScaler {
+            rotation_scale: view.rotation_scale(),
+            stretch_scale: view.stretch_scale(),
+        };
+        let own = &bench.prepared.scaler;
+        let mut train_weights = vec![vec![0.0; decoder.component_count()]];
+        train_weights.par_extend(bench.prepared.network.par_iter().map(|shape| {
+            let features = scaler.to_network(&own.from_network(shape));
+            decoder.project(&features, &bench.areas, vec![0.0; decoder.component_count()])
+        }));
+        let model = GradientModel {
+            decoder: Box::new(decoder),
+            field: &bench.prepared.system,
+            scales: scaler.scales(),
+        };
+        let found = [
+            (
+                ProjectionKind::Encoder,
+                shapes.encoder,
+                Some(evaluation.max_percentage_error.two_level),
+            ),
+            (ProjectionKind::Features, shapes.feature_projection, None),
+            (ProjectionKind::Positions, shapes.position_projection, None),
+        ];
+        let found = found.map(|(kind, shapes, max_percentage_error)| Found {
+            kind,
+            shapes,
+            max_percentage_error,
+        });
+        let trained = Trained {
+            name,
+            source,
+            training_seconds,
+            package_bytes: Some(package.len()),
+            train_weights,
+        };
+        self.finish(trained, &model, found.into())
+    }
+
+    /// Scores what was found, moves shapes by control points, and keeps it all.
+    fn finish(&mut self, trained: Trained<'_>, model: &dyn Model, found: Vec<Found>) -> Result<(), CompareError> {
+        let bench = self.bench;
+        let fail = |source| CompareError::Score {
+            method: trained.name.to_owned(),
+            source,
+        };
+        let mut projections = Vec::new();
+        for found in &found {
+            projections.push(Projection {
+                kind: found.kind,
+                scores: score(&bench.truth, &found.shapes, &bench.input.sequence.faces).map_err(fail)?,
+                max_percentage_error: found.max_percentage_error,
+            });
+        }
+        let energies = model.energies();
+        let (elements, width) = model.stored();
+        let used = elements.iter().filter(|&&count| count > 0).count();
+        let all = energies.len() * elements.iter().copied().max().unwrap_or(0);
+        // Sparse rows name their elements by four bytes each.
+        let bytes = |number: usize| {
+            let sparse: usize = elements.iter().map(|count| count * (width * number + 4)).sum();
+            sparse.min(all * width * number)
+        };
+        self.methods.push(Method {
+            name: trained.name.to_owned(),
+            source: trained.source.to_owned(),
+            components: used,
+            training_seconds: trained.training_seconds,
+            locality: bench.locality(&energies),
+            basis_bytes_f32: bytes(4),
+            basis_bytes_f16: bytes(2),
+            package_bytes: trained.package_bytes,
+            projections,
+            control_point_e_rms: self.move_by_handles(model, &trained.train_weights).map_err(fail)?,
+        });
+        self.reconstructions
+            .push(found.into_iter().map(|found| found.shapes).collect());
+        self.reporter.advance(1, "");
+        Ok(())
+    }
+
+    /// E_rms of some measured shapes, their control points alone known, for every number of control points.
+    fn move_by_handles(
+        &self,
+        model: &dyn Model,
+        train_weights: &[Vec<f64>],
+    ) -> Result<Vec<f64>, crate::evaluate::ScoreError> {
+        let bench = self.bench;
+        if self.control_points.is_empty() {
+            return Ok(Vec::new());
+        }
+        let scales: Vec<f64> = (0..model.component_count())
+            .map(|k| {
+                let squares: f64 = train_weights.iter().map(|w| w[k] * w[k]).sum();
+                (squares / train_weights.len() as f64).sqrt()
+            })
+            .collect();
+        let count = HANDLE_SHAPES.min(bench.test.len());
+        let chosen: Vec<usize> = (0..count)
+            .map(|i| (2 * i + 1) * bench.test.len() / (2 * count))
+            .collect();
+        let truth: Vec<Vec<[f32; 3]>> = chosen.iter().map(|&n| bench.truth[n].clone()).collect();
+        let handles = model.handles(&self.handles);
+        let diagonal = bench.diagonal();
+        let errors = self.control_points.iter().map(|&count| {
+            let posed: Vec<Vec<[f32; 3]>> = chosen
+                .par_iter()
+                .map(|&n| {
+                    let targets: Vec<[f64; 3]> = self.handles[..count].iter().map(|&v| bench.test[n][v]).collect();
+                    let weights = weights_from_handles(&*handles, &targets, &scales, diagonal);
+                    narrowed(&model.pose(&weights))
+                })
+                .collect();
+            Ok(NormalisedPair::new(&truth, &posed)?.e_rms())
+        });
+        errors.collect()
+    }
+}

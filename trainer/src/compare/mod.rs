@@ -1,0 +1,188 @@
+//! The systems of the paper's table on one sequence: trained on the same shapes with the same budget of components, measured
+//! on the same unseen shapes by the same figures.
+//!
+//! Path of data: sequence, split -> `Bench` (aligned shapes, features) -> [`crate::baselines`] and this
+//! project's own training -> weights of unseen shapes, each method's own way ([`fitting`]) -> [`Comparison`].
+
+mod bench;
+pub mod fitting;
+mod methods;
+
+use serde::{Deserialize, Serialize};
+use sinew_formats::interchange::MeshSequence;
+
+use crate::config::TrainConfig;
+use crate::evaluate::{EvaluationError, ScoreError, Scores};
+use crate::learn::LearnError;
+use crate::mesh::sparse_factor::FactorError;
+
+pub use methods::compare;
+
+/// Radius within which a component's energy counts as local, as a share of the longest distance along the surface.
+pub const LOCAL_RADIUS: f32 = 0.2;
+
+/// What a reader of the paper's table will miss here.
+pub const NOT_COMPARED: &str =
+    "Of the paper's table, edge lengths and dihedral angles (Wang et al. 2017) are not here.";
+
+/// Numbers of control points that shapes are moved by.
+pub const HANDLE_COUNTS: [usize; 6] = [2, 5, 10, 20, 35, 50];
+
+/// What is compared, and on what.
+#[derive(Debug, Clone, Copy)]
+pub struct CompareInput<'a> {
+    /// The shapes.
+    pub sequence: &'a MeshSequence,
+    /// Shapes to train on, ascending; shape 0 is the reference either way.
+    pub train_shapes: &'a [usize],
+    /// A compact package trained on just these, to stand for this project's own training.
+    pub ours: Option<&'a [u8]>,
+    /// How.
+    pub settings: &'a CompareSettings,
+}
+
+/// How methods are trained and fitted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CompareSettings {
+    /// Components of every method, all levels together.
+    pub component_count: usize,
+    /// Epochs of the one-level autoencoder.
+    pub epochs: usize,
+    /// Leaves out what takes longest: peers fitted in positions, and control points.
+    pub quick: bool,
+    /// This project's configuration: features for all, training for its own.
+    pub config: TrainConfig,
+}
+
+/// The figures of all methods, as `sinew compare --json` writes them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Comparison {
+    /// Name of the sequence.
+    pub sequence: String,
+    /// V.
+    pub vertices: usize,
+    /// Shapes trained on, the reference included.
+    pub train_shapes: usize,
+    /// Shapes measured.
+    pub test_shapes: usize,
+    /// The budget.
+    pub components: usize,
+    /// Seed of what is random.
+    pub seed: u64,
+    /// See [`HANDLE_COUNTS`]; empty where they were left out.
+    pub control_points: Vec<usize>,
+    /// Features alone, no components: below it no method in these features can fall.
+    pub round_trip: Scores,
+    /// In the order of the table.
+    pub methods: Vec<Method>,
+}
+
+/// One method.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Method {
+    /// Its name.
+    pub name: String,
+    /// Where it is described.
+    pub source: String,
+    /// Components that are not zero.
+    pub components: usize,
+    /// Seconds of training, features not counted but in this project's own; `None` where it was trained before.
+    pub training_seconds: Option<f64>,
+    /// Share of a component's energy within [`LOCAL_RADIUS`] of its centre, mean over components, in the values that the
+    /// method factors.
+    pub locality: f64,
+    /// Numbers of the basis at four bytes, zeros left out where that is smaller.
+    pub basis_bytes_f32: usize,
+    /// The same at two bytes.
+    pub basis_bytes_f16: usize,
+    /// The whole compact package, mesh and all, where there is one.
+    pub package_bytes: Option<usize>,
+    /// The ways to find weights.
+    pub projections: Vec<Projection>,
+    /// E_rms of a few unseen shapes moved by [`Comparison::control_points`].
+    pub control_point_e_rms: Vec<f64>,
+}
+
+/// One way to find the weights of an unseen shape.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Projection {
+    /// Which.
+    pub kind: ProjectionKind,
+    /// E_rms and STED.
+    #[serde(flatten)]
+    pub scores: Scores,
+    /// Share of a shape's energy, in the method's own features, that is missed; worst shape. Not for methods in positions.
+    pub max_percentage_error: Option<f64>,
+}
+
+/// Where weights come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ProjectionKind {
+    /// A network's own encoder.
+    Encoder,
+    /// Least squares in features.
+    Features,
+    /// Least squares in positions.
+    Positions,
+}
+
+impl ProjectionKind {
+    /// For people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Encoder => "encoder",
+            Self::Features => "features",
+            Self::Positions => "positions",
+        }
+    }
+}
+
+/// The shapes behind the figures.
+#[derive(Debug, Clone, Default)]
+pub struct ComparedShapes {
+    /// Indices of the measured shapes.
+    pub shapes: Vec<usize>,
+    /// Measured shapes aligned to the reference. Shape: `[N][V]`.
+    pub truth: Vec<Vec<[f32; 3]>>,
+    /// Shape: `[method][projection][N][V]`.
+    pub reconstructions: Vec<Vec<Vec<Vec<[f32; 3]>>>>,
+}
+
+/// Why methods cannot be compared.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CompareError {
+    /// Nothing is left to measure.
+    #[error("all {0} shapes are trained on: none is left to measure (--train-every 10)")]
+    NothingToMeasure(usize),
+    /// The split is too small, the mesh cannot be used, or training fails.
+    #[error(transparent)]
+    Learn(#[from] LearnError),
+    /// A package cannot be measured.
+    #[error(transparent)]
+    Evaluation(#[from] EvaluationError),
+    /// A result cannot be scored.
+    #[error("the result of {method} cannot be scored: {source}")]
+    Score {
+        /// Whose.
+        method: String,
+        /// Why.
+        source: ScoreError,
+    },
+    /// The faces cannot be solved on.
+    #[error("the mesh cannot be solved on: {0}")]
+    Factor(#[from] FactorError),
+}
+
+/// Two levels that together have as near to `budget` components as can be, about four fine ones under each coarse one.
+pub fn two_levels(budget: usize) -> Vec<usize> {
+    let candidates = (1..=12)
+        .map(|fine| (budget / (1 + fine), fine))
+        .filter(|(coarse, _)| *coarse > 0);
+    let best = candidates.min_by_key(|&(coarse, fine)| (budget - coarse * (1 + fine), fine.abs_diff(4)));
+    best.map_or_else(|| vec![budget.max(1)], |(coarse, fine)| vec![coarse, fine])
+}
+
+#[cfg(test)]
+mod tests;
