@@ -30,7 +30,7 @@ pub fn compact_package() -> AlignedBytes {
 /// One of the same shape with another rest mesh, and values so large that large weights overflow.
 pub fn other_package() -> AlignedBytes {
     let mut baked = tiny_baked();
-    baked.rest_positions[0][2] += 0.25;
+    baked.exact.rest_positions[0][2] += 0.25;
     for component in &mut baked.components {
         component.value_scale = limits::VALUE_SCALE;
     }
