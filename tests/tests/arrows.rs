@@ -37,7 +37,7 @@ const ARROWS: &[(&str, &[&str])] = &[
 /// What a crate may use in its tests and benchmarks besides: the runtime's benchmarks and the simulated box's tests play packages
 /// baked on the spot.
 const DEVELOPMENT_ARROWS: &[(&str, &[&str])] = &[
-    ("sinew-runtime", &["sinew-peers"]),
+    ("sinew-runtime", &["sinew-peers", "sinew-bake"]),
     ("sinew-simulator", &["sinew-bake"]),
 ];
 
