@@ -284,6 +284,14 @@ enum SinewStatus
    * Two controls have one name.
    */
   SINEW_STATUS_PACKAGE_NAME_DUPLICATE = 129,
+  /**
+   * The skin weights of a vertex of the fast tier do not sum to one.
+   */
+  SINEW_STATUS_PACKAGE_SKIN_WEIGHT_SUM = 130,
+  /**
+   * A triangle of render vertices does not stand for the corners of its triangle.
+   */
+  SINEW_STATUS_PACKAGE_RENDER_FACE_DIFFERS = 131,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L

@@ -48,6 +48,8 @@ fn frame_status(error: FrameError) -> SinewStatus {
         FrameError::NoSuchComponent { .. } => SinewStatus::NoSuchControl,
         FrameError::FeatureNotFinite { .. } => SinewStatus::NotFinite,
         FrameError::NotFinite { .. } => SinewStatus::FrameOverflow,
+        // Workspaces made through C are of the exact tier.
+        FrameError::NeedsExactTier => SinewStatus::Internal,
         _ => SinewStatus::Internal,
     }
 }
@@ -80,6 +82,8 @@ fn open_status(error: OpenError) -> SinewStatus {
         OpenError::NotContiguous { .. } => SinewStatus::PackageNotContiguous,
         OpenError::NotAPermutation { .. } => SinewStatus::PackageNotAPermutation,
         OpenError::NotSymmetric { .. } => SinewStatus::PackageNotSymmetric,
+        OpenError::SkinWeightSum { .. } => SinewStatus::PackageSkinWeightSum,
+        OpenError::RenderFaceDiffers { .. } => SinewStatus::PackageRenderFaceDiffers,
         OpenError::BitmapTail { .. } => SinewStatus::PackageBitmapTail,
         OpenError::RangeWithoutZero { .. } => SinewStatus::PackageRangeWithoutZero,
         OpenError::NameInvalid { .. } => SinewStatus::PackageNameInvalid,

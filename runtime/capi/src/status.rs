@@ -112,10 +112,14 @@ pub enum SinewStatus {
     PackageNameInvalid = 128,
     /// Two controls have one name.
     PackageNameDuplicate = 129,
+    /// The skin weights of a vertex of the fast tier do not sum to one.
+    PackageSkinWeightSum = 130,
+    /// A triangle of render vertices does not stand for the corners of its triangle.
+    PackageRenderFaceDiffers = 131,
 }
 
 /// Status, its name in the header, its text.
-const TABLE: [(SinewStatus, &CStr, &CStr); 52] = [
+const TABLE: [(SinewStatus, &CStr, &CStr); 54] = [
     (SinewStatus::Ok, c"SINEW_STATUS_OK", c"done"),
     (
         SinewStatus::NullPointer,
@@ -371,6 +375,16 @@ const TABLE: [(SinewStatus, &CStr, &CStr); 52] = [
         SinewStatus::PackageNameDuplicate,
         c"SINEW_STATUS_PACKAGE_NAME_DUPLICATE",
         c"two controls of the package have the same name",
+    ),
+    (
+        SinewStatus::PackageSkinWeightSum,
+        c"SINEW_STATUS_PACKAGE_SKIN_WEIGHT_SUM",
+        c"package: skin weights of the fast tier do not sum to one",
+    ),
+    (
+        SinewStatus::PackageRenderFaceDiffers,
+        c"SINEW_STATUS_PACKAGE_RENDER_FACE_DIFFERS",
+        c"package: a triangle of render vertices does not stand for its triangle",
     ),
 ];
 

@@ -107,7 +107,6 @@ pub fn compare(input: CompareInput<'_>, reporter: &dyn Reporter) -> Result<(Comp
     run.gradients("Deformation gradients", "Huang et al. 2014", &faces, |train| {
         huang(&field, train, &distances, count)
     })?;
-    drop(faces);
 
     run.one_level_autoencoder()?;
     run.ours()?;

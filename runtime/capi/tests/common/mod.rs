@@ -27,12 +27,17 @@ pub fn compact_package() -> AlignedBytes {
     write_compact(&tiny_compact().basis()).expect("the fixture is valid")
 }
 
-/// One of the same shape with another rest mesh, and values so large that large weights overflow.
+/// One of the same shape with another rest mesh, and a solver so stiff that large weights overflow.
 pub fn other_package() -> AlignedBytes {
     let mut baked = tiny_baked();
     baked.exact.rest_positions[0][2] += 0.25;
-    for component in &mut baked.components {
-        component.value_scale = limits::VALUE_SCALE;
+    baked.exact.ring_weights.fill(limits::EDGE_WEIGHT);
+    baked.exact.tiles.as_flattened_mut().fill(limits::FACTOR_VALUE);
+    for block in &mut baked.exact.inverse_diagonals {
+        block
+            .iter_mut()
+            .filter(|x| **x > 0.0)
+            .for_each(|x| *x = limits::INVERSE_PIVOT);
     }
     write_baked(&baked.basis()).expect("the fixture is valid")
 }
