@@ -42,8 +42,10 @@ impl fmt::Display for Recognition {
     }
 }
 
-// A heap would even the sizes out; there is none.
-#[allow(clippy::large_enum_variant)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "a heap would even the sizes out; there is none"
+)]
 enum Parser {
     Sniffing(Sniffer, Counters),
     Lines(Lines),
