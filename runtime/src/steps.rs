@@ -5,7 +5,7 @@ use crate::basis::Basis;
 use crate::decode::Decoded;
 use crate::error::{Buffer, FrameError};
 use crate::normals::check_length;
-use crate::solve::{emit, right_hand_side, substitute};
+use crate::solve::{self, emit, substitute};
 use crate::workspace::Workspace;
 
 /// Blend, tanh and exponential map of all components of the pose.
@@ -27,10 +27,10 @@ pub fn decode(basis: &Basis<'_>, workspace: &mut Workspace<'_>) -> Result<(), Fr
 ///
 /// # Errors
 /// Those of [`decode`].
-pub fn force(basis: &Basis<'_>, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
+pub fn right_hand_side(basis: &Basis<'_>, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
     workspace.validate_exact(basis)?;
     let tier = basis.exact();
-    right_hand_side(
+    solve::right_hand_side(
         workspace.kernels,
         &tier.rings(),
         tier.rest_positions(),

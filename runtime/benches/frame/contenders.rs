@@ -166,7 +166,9 @@ fn steps<'c>(basis: &'c Basis<'c>, kernels: Kernels) -> [Contender<'c>; 4] {
     type Step = fn(&Basis<'_>, &mut Workspace<'_>, &mut [[f32; 3]]) -> Result<(), FrameError>;
     let steps: [(&str, Step); 4] = [
         ("decode", |basis, workspace, _| steps::decode(basis, workspace)),
-        ("right-hand side", |basis, workspace, _| steps::force(basis, workspace)),
+        ("right-hand side", |basis, workspace, _| {
+            steps::right_hand_side(basis, workspace)
+        }),
         ("solve", |basis, workspace, _| steps::solve(basis, workspace)),
         ("scatter, bounding box", steps::scatter),
     ];

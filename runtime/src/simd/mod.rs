@@ -3,6 +3,20 @@
 //! [`scalar`] is the reference; every other kernel equals it within a named tolerance. Which ones run is decided once, when
 //! a workspace is made: by what the processor says on x86-64, at compile time elsewhere.
 
+/// Hands every kernel that is written for any lanes to a macro: one list, for each instruction set and for the choice
+/// between them. Stands before the modules that use it.
+macro_rules! generic_kernels {
+    ($each:ident) => {
+        $each!(rest_activations(blocks: &mut [BlockRest]));
+        $each!(decode(decoder: &Decoder<'_>, gradients: &mut [Gradient]));
+        $each!(features(decoder: &Decoder<'_>, g: usize, features: &mut Group<f32>));
+        $each!(gradients(scales: FeatureScales, features: &Group<f32>, gradients: &mut [Gradient]));
+        $each!(held(decoder: &Decoder<'_>, pulls: &[Pull], features: &mut [Group<f32>], sums: &mut [HeldSums]));
+        $each!(derivatives(decoder: &Decoder<'_>, pulls: &[Pull], features: &[Group<f32>], sums: &mut [HeldSums]));
+        $each!(tangents(decoder: &Decoder<'_>, k: usize, scale: f32, gradients: &mut [Gradient]));
+    };
+}
+
 pub(crate) mod adjoint;
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod avx2;
@@ -50,13 +64,7 @@ impl Kernels {
         }
     }
 
-    dispatch!(rest_activations(blocks: &mut [BlockRest]));
-    dispatch!(decode(decoder: &Decoder<'_>, gradients: &mut [Gradient]));
-    dispatch!(features(decoder: &Decoder<'_>, g: usize, features: &mut Group<f32>));
-    dispatch!(gradients(scales: FeatureScales, features: &Group<f32>, gradients: &mut [Gradient]));
-    dispatch!(held(decoder: &Decoder<'_>, pulls: &[Pull], features: &mut [Group<f32>], sums: &mut [HeldSums]));
-    dispatch!(derivatives(decoder: &Decoder<'_>, pulls: &[Pull], features: &[Group<f32>], sums: &mut [HeldSums]));
-    dispatch!(tangents(decoder: &Decoder<'_>, k: usize, scale: f32, gradients: &mut [Gradient]));
+    generic_kernels!(dispatch);
 }
 
 /// A set of kernels.

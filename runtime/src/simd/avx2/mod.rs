@@ -32,10 +32,4 @@ macro_rules! kernel {
     };
 }
 
-kernel!(rest_activations(blocks: &mut [BlockRest]));
-kernel!(decode(decoder: &Decoder<'_>, gradients: &mut [Gradient]));
-kernel!(features(decoder: &Decoder<'_>, g: usize, features: &mut Group<f32>));
-kernel!(gradients(scales: FeatureScales, features: &Group<f32>, gradients: &mut [Gradient]));
-kernel!(held(decoder: &Decoder<'_>, pulls: &[Pull], features: &mut [Group<f32>], sums: &mut [HeldSums]));
-kernel!(derivatives(decoder: &Decoder<'_>, pulls: &[Pull], features: &[Group<f32>], sums: &mut [HeldSums]));
-kernel!(tangents(decoder: &Decoder<'_>, k: usize, scale: f32, gradients: &mut [Gradient]));
+generic_kernels!(kernel);
