@@ -13,9 +13,8 @@ use sinew_runtime::Basis;
 /// The file cannot be read, is no package, or cannot be baked.
 pub fn load(path: &Path) -> Result<AlignedBytes, Report> {
     let refuse = || format!("{} is no usable package", path.display());
-    let bytes = read_package(path)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("cannot read {}", path.display()))?;
+    // The error names the file.
+    let bytes = read_package(path).into_diagnostic()?;
     match PackageKind::of(&bytes).into_diagnostic().wrap_err_with(refuse)? {
         PackageKind::Compact => bake_bytes(&bytes).into_diagnostic().wrap_err_with(refuse),
         _ => Ok(bytes),

@@ -52,11 +52,9 @@ fn load_sequence(path: &Path, console: &Console) -> Result<MeshSequence, Report>
     Ok(read.sequence)
 }
 
-/// Reads the bytes of a package file.
+/// Reads the bytes of a package file. The error names it.
 fn load_package(path: &Path) -> Result<AlignedBytes, Report> {
-    read_package(path)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("cannot read {}", path.display()))
+    read_package(path).into_diagnostic()
 }
 
 /// The folder a file is to be written to must exist, so that hours of work do not end in a message.

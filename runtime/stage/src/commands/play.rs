@@ -27,18 +27,18 @@ use crate::wiring::{HeardKnob, Router, resolve};
 /// Arguments of `sinew-stage play`.
 #[derive(Args)]
 #[command(
-    after_help = "Without --knobs the knobs found follow the component tree: coarse components on the first ones, and on the others
-the children of the coarse knob turned last. A knob moves its component once it has passed the place where that stands, so
-that nothing jumps; the view says which way to turn.
+    after_help = "Without --knobs the knobs found follow the component tree: coarse components on the first ones, and on the others \
+        the children of the coarse knob turned last. A knob moves its component once it has passed the place where that stands, so \
+        that nothing jumps; the view says which way to turn.
 
-Without a device, or beside one, --typed takes lines such as `c0 0.5`, `rest`, `stop`, `release`, `next`, `previous`, `into`,
-`out`, `next-fine`, `focus c0`, `page 2`, `record` and `quit` on standard input.
+Without a device, or beside one, --typed takes lines such as `c0 0.5`, `rest`, `stop`, `release`, `next`, `previous`, `into`, \
+        `out`, `next-fine`, `focus c0`, `page 2`, `record` and `quit` on standard input.
 
-Streams: obj:FILE replaces one OBJ file at every frame, obj:FOLDER/ numbers them; raw and raw:FILE write floats; udp:PORT
-and udp-weights:PORT send datagrams to this machine. docs/streams.md has the layouts.
+Streams: obj:FILE replaces one OBJ file at every frame, obj:FOLDER/ numbers them; raw and raw:FILE write floats; udp:PORT \
+        and udp-weights:PORT send datagrams to this machine. docs/streams.md has the layouts.
 
-A take holds what the knobs said, not what the mesh did: --replay plays it to the bit on the package it was played on, and
-by the names of its components on another. With --fps, a replay has frames of its own, for keys at 24 a second.
+A take holds what the knobs said, not what the mesh did: --replay plays it to the bit on the package it was played on, and \
+        by the names of its components on another. With --fps, a replay has frames of its own, for keys at 24 a second.
 
 Examples:
   sinew-stage play walk.sinew                                  plug a box in and turn

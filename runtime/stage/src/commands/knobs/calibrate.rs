@@ -23,11 +23,11 @@ const DONE_US: u64 = 2_000_000;
 /// Arguments of `sinew-stage knobs calibrate`.
 #[derive(Args)]
 #[command(
-    after_help = "Turn every knob once from stop to stop, let it go, and leave it for half a second. Knobs with a spring or a detent:
-let them stand in the middle first, and bring them back there, so that the middle is measured too.
+    after_help = "Turn every knob once from stop to stop, let it go, and leave it for half a second. Knobs with a spring or a detent: \
+        let them stand in the middle first, and bring them back there, so that the middle is measured too.
 
-It ends by itself two seconds after every knob that was heard is done, or with Enter; what was measured is kept under the
-device's identity, knobs that were not turned keep what was measured before. `play` finds it there.
+It ends by itself two seconds after every knob that was heard is done, or with Enter; what was measured is kept under the \
+        device's identity, knobs that were not turned keep what was measured before. `play` finds it there.
 
 Without a calibration a knob is taken to reach from 0 to its full scale, which few do."
 )]

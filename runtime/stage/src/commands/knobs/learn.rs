@@ -23,11 +23,11 @@ use crate::wiring::{resolve, unknown_component};
 /// Arguments of `sinew-stage knobs learn`.
 #[derive(Args)]
 #[command(
-    after_help = "Turn a knob: it is named, and you say which component it is to move. Enter takes the one proposed (coarse ones first),
-`-` skips the knob, `done` writes the file. For a button write stop, release, next, previous, into, out or next-fine.
+    after_help = "Turn a knob: it is named, and you say which component it is to move. Enter takes the one proposed (coarse ones first), \
+        `-` skips the knob, `done` writes the file. For a button write stop, release, next, previous, into, out or next-fine.
 
-With --auto nothing is asked: the first knob turned gets the first coarse component, the second the second, and so on until
-there are no components left, or Enter, or the time is up.
+With --auto nothing is asked: the first knob turned gets the first coarse component, the second the second, and so on until \
+        there are no components left, or Enter, or the time is up.
 
 The file is a beginning: docs/knobs.toml shows what else may stand in it."
 )]

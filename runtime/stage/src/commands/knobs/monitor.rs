@@ -15,9 +15,9 @@ use crate::view::words;
 /// Arguments of `sinew-stage knobs monitor`.
 #[derive(Args)]
 #[command(
-    after_help = "The first lines say which port is read, what it speaks, and how sure that is; then every knob with its reading, and
-below how much came and how much of it made no sense, with the reason of the last. Nothing makes sense: try another --baud.
-Ends with Ctrl-C or Enter."
+    after_help = "The first lines say which port is read, what it speaks, and how sure that is; then every knob with its reading, and \
+        below how much came and how much of it made no sense, with the reason of the last. Nothing makes sense: try another --baud. \
+        Ends with Ctrl-C or Enter."
 )]
 pub struct MonitorArguments {
     #[command(flatten)]

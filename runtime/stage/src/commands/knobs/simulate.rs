@@ -13,29 +13,20 @@ use sinew_simulator::{BoxSettings, COMMANDS, Command, Dialect, KnobBox, Port, Sc
 
 use crate::commands::{Failure, catch_interrupts, interrupted, parse_duration};
 
+/// What stands below the options: the commands are the simulator's own list.
+fn help() -> String {
+    let commands: String = COMMANDS.lines().map(|line| format!("  {line}\n")).collect();
+    format!(
+        "Without a script the knobs wander by themselves. Commands are taken on standard input, one a line, and from a script, \
+         where each may have a time in front (since the beginning), `wait TIME` stands between, and `repeat` at the end begins \
+         anew:\n\n{commands}\nExamples:\n  sinew-stage knobs simulate\n  sinew-stage knobs simulate --speak packets --path \
+         /tmp/box --script show.txt"
+    )
+}
+
 /// Arguments of `sinew-stage knobs simulate`.
 #[derive(Args)]
-#[command(
-    after_help = "Without a script the knobs wander by themselves. Commands are taken on standard input, one a line, and from a script,
-where each may have a time in front (since the beginning), `wait TIME` stands between, and `repeat` at the end begins anew:
-
-  turn KNOB FROM TO TIME   a hand turns a knob: turn 0 0.2 0.9 1s
-  set KNOB POSITION        a knob stands elsewhere at once: set 0 0.5
-  wander on|off            all knobs turn by themselves
-  noise STEPS              standard deviation of readings, in steps of ten bits
-  sag FACTOR               part of its voltage that the supply gives; 1 is healthy
-  rate HERTZ               reports a second; thousands are a flood
-  burst COUNT              so many reports at once
-  garbage BYTES            random bytes
-  cut                      the next report loses its end
-  freeze TIME              readings stand still to the last bit
-  silent TIME              no reports
-  unplug TIME              the cable is out: unplug 2s
-
-Examples:
-  sinew-stage knobs simulate
-  sinew-stage knobs simulate --speak packets --path /tmp/box --script show.txt"
-)]
+#[command(after_help = help())]
 pub struct SimulateArguments {
     /// What it speaks: deej, csv, labels, packets, encoders, midi, midi14, firmata, osc
     #[arg(long, value_name = "DIALECT", default_value = "deej", value_parser = parse_dialect)]
