@@ -38,7 +38,7 @@ const ARROWS: &[(&str, &[&str])] = &[
 /// baked on the spot.
 const DEVELOPMENT_ARROWS: &[(&str, &[&str])] = &[
     ("sinew-runtime", &["sinew-peers", "sinew-bake"]),
-    ("sinew-simulator", &["sinew-bake"]),
+    ("sinew-simulator", &["sinew-bake", "sinew-peers"]),
 ];
 
 /// Everything that the runtime links, all of it without std.
