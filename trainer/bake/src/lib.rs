@@ -197,6 +197,8 @@ fn fold_package(package: &CompactView<'_>, surface: &Surface, order: &Eliminatio
     let frame = FoldFrame {
         ring_offsets: &surface.topology.ring_offsets,
         ring: &surface.topology.ring,
+        areas: &surface.gradient_areas(),
+        rounding_order: &surface.towards(package.anchor_vertex() as usize),
         solver_from_vertex: &order.solver_from_vertex,
     };
     frame.fold(&sparse::unpack_components(package), &decoders, &value_scales)
