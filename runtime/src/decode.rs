@@ -7,6 +7,9 @@ use crate::simd::lanes::Gradient;
 
 /// Weights nearer to zero are zero: their products would be denormal and slow, and nobody sees them.
 const FLUSH_BELOW: f32 = 1e-6;
+/// Scaled weights nearer to zero are zero: times the largest half that the baker writes they stay below what tanh rounds
+/// off, and times the smallest they leave tanh a square that is a normal number.
+const FACTOR_START: f32 = 1.7e-11;
 /// Scaled weights end here: times the largest half they are finite, so that a blend never is infinity less infinity.
 const FACTOR_END: f32 = 5e33;
 
@@ -18,7 +21,7 @@ pub(crate) fn flushed(weight: f32) -> f32 {
 /// What component `k` counts at a weight.
 pub(crate) fn factor(tier: &Tier<'_>, k: usize, weight: f32) -> f32 {
     let scaled = (weight * tier.value_scale(k)).clamp(-FACTOR_END, FACTOR_END);
-    if scaled.is_normal() { scaled } else { 0.0 }
+    if scaled.abs() < FACTOR_START { 0.0 } else { scaled }
 }
 
 /// Buffers of a pose that decode keeps from frame to frame.

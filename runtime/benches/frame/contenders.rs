@@ -11,7 +11,7 @@ use sinew_runtime::{
     Workspace, WorkspaceLayout, steps,
 };
 
-use crate::measure::Contender;
+use crate::measure::{Contender, Role};
 
 /// Morph targets of the yardstick.
 const TARGETS: usize = 60;
@@ -27,6 +27,8 @@ impl Contenders {
     /// Hands all contenders on a subject to `then`.
     pub fn of(subject: &Subject, then: impl FnOnce(&mut [Contender<'_>])) {
         let basis = Basis::open(&subject.baked).expect("a sound package");
+        let without_bias = subject.without_bias();
+        let faint = Basis::open(&without_bias).expect("a sound package");
         let mut contenders = Vec::new();
         for kernels in [Kernels::Scalar, Kernels::Avx2, Kernels::Avx512] {
             if kernels.run_here() {
@@ -41,7 +43,9 @@ impl Contenders {
                     }
                     contenders.extend([1, 4].map(|held| drag(&basis, kernels, held)));
                     contenders.push(unchanged(&basis, kernels));
-                    contenders.push(solve_path(&basis, kernels));
+                    let features = |v: usize, c: usize| 0.3 * (0.01 * v as f32 + c as f32).sin();
+                    contenders.push(solve_path(&basis, kernels, features));
+                    contenders.extend(floods(&basis, &faint, kernels));
                     contenders.extend(steps(&basis, kernels));
                 }
             }
@@ -68,9 +72,22 @@ fn frame<'c>(
     active: usize,
     with_normals: bool,
 ) -> Contender<'c> {
+    let component_count = basis.component_count();
+    let poses = (0..POSES).map(|n| Subject::pose(component_count, active, n)).collect();
+    playing(basis, tier, kernels, active, with_normals, poses)
+}
+
+/// Frames that go through `poses`.
+fn playing<'c>(
+    basis: &'c Basis<'c>,
+    tier: TierChoice,
+    kernels: Kernels,
+    active: usize,
+    with_normals: bool,
+    poses: Vec<Vec<f32>>,
+) -> Contender<'c> {
     let mut workspace = workspace(basis, tier, kernels);
     let component_count = basis.component_count();
-    let poses: Vec<Vec<f32>> = (0..POSES).map(|n| Subject::pose(component_count, active, n)).collect();
     let mut weights = vec![0.0; component_count];
     let mut positions = vec![[0.0; 3]; basis.vertex_count()];
     let mut normals = positions.clone();
@@ -94,7 +111,7 @@ fn frame<'c>(
     };
     Contender {
         name,
-        is_yardstick: false,
+        role: Role::Measured,
         run: Box::new(run),
     }
 }
@@ -104,7 +121,7 @@ fn unchanged<'c>(basis: &'c Basis<'c>, kernels: Kernels) -> Contender<'c> {
     let mut one = frame(basis, TierChoice::Exact, kernels, basis.component_count(), true);
     Contender {
         name: format!("frame, {kernels:?}, nothing moved"),
-        is_yardstick: false,
+        role: Role::Measured,
         run: Box::new(move |_| (one.run)(0)),
     }
 }
@@ -134,16 +151,16 @@ fn drag<'c>(basis: &'c Basis<'c>, kernels: Kernels, held: usize) -> Contender<'c
     };
     Contender {
         name: format!("drag update, {kernels:?}, {held} held"),
-        is_yardstick: false,
+        role: Role::Measured,
         run: Box::new(run),
     }
 }
 
 /// Exponential map, right-hand side, solve, scatter: the frame behind the blend.
-fn solve_path<'c>(basis: &'c Basis<'c>, kernels: Kernels) -> Contender<'c> {
+fn solve_path<'c>(basis: &'c Basis<'c>, kernels: Kernels, feature: impl Fn(usize, usize) -> f32) -> Contender<'c> {
     let mut workspace = workspace(basis, TierChoice::Exact, kernels);
     let features: Vec<[f32; 9]> = (0..basis.vertex_count())
-        .map(|v| core::array::from_fn(|c| 0.3 * (0.01 * v as f32 + c as f32).sin()))
+        .map(|v| core::array::from_fn(|c| feature(v, c)))
         .collect();
     let mut positions = vec![[0.0; 3]; basis.vertex_count()];
     let run = move |_| {
@@ -156,9 +173,33 @@ fn solve_path<'c>(basis: &'c Basis<'c>, kernels: Kernels) -> Contender<'c> {
     };
     Contender {
         name: format!("features to positions, {kernels:?}"),
-        is_yardstick: false,
+        role: Role::Measured,
         run: Box::new(run),
     }
+}
+
+/// Powers of ten from one down to the last denormal number, one after the other.
+fn falling(n: usize) -> f32 {
+    10_f32.powi(-((n % 46) as i32))
+}
+
+/// The frame and its part behind the blend on inputs full of denormals: `faint` is the subject without biases, where nothing
+/// lifts what is tiny. Its weights are all denormal but for some, ever others, that are tiny or ordinary.
+fn floods<'c>(basis: &'c Basis<'c>, faint: &'c Basis<'c>, kernels: Kernels) -> [Contender<'c>; 2] {
+    let all = faint.component_count();
+    let poses = (0..POSES)
+        .map(|n| (0..all).map(|k| falling(7 * k + n)).collect())
+        .collect();
+    let mut whole = playing(faint, TierChoice::Exact, kernels, all, true, poses);
+    let name = core::mem::replace(&mut whole.name, format!("exact frame, {kernels:?}, denormal flood"));
+    whole.role = Role::FloodOf(name);
+    let mut behind = solve_path(basis, kernels, |v, c| falling(31 * v + 5 * c));
+    let name = core::mem::replace(
+        &mut behind.name,
+        format!("features to positions, {kernels:?}, denormal flood"),
+    );
+    behind.role = Role::FloodOf(name);
+    [whole, behind]
 }
 
 /// The steps of a frame one by one, all components active.
@@ -187,7 +228,7 @@ fn steps<'c>(basis: &'c Basis<'c>, kernels: Kernels) -> [Contender<'c>; 4] {
         frame.run(&mut workspace).expect("weights in range");
         Contender {
             name: format!("step: {name}, {kernels:?}"),
-            is_yardstick: false,
+            role: Role::Measured,
             run: Box::new(move |_| step(basis, &mut workspace, &mut positions).expect("an exact workspace")),
         }
     })
@@ -211,7 +252,7 @@ fn normals<'c>(basis: &'c Basis<'c>) -> Contender<'c> {
     };
     Contender {
         name: "normals alone".into(),
-        is_yardstick: false,
+        role: Role::Measured,
         run: Box::new(run),
     }
 }
@@ -224,7 +265,7 @@ fn morphs<'c>(subject: &Subject) -> Vec<Contender<'c>> {
             let mut out = vec![0.0; 3 * subject.rest.len()];
             Contender {
                 name: format!("peer: {TARGETS} morph targets {name}"),
-                is_yardstick: true,
+                role: Role::Yardstick,
                 run: Box::new(move |round| {
                     let weights = Subject::pose(TARGETS, TARGETS, round);
                     run(&morph, &weights, black_box(&mut out));
@@ -239,7 +280,7 @@ fn skinning<'c>(subject: &Subject) -> Contender<'c> {
     let (mut positions, mut normals) = (subject.rest.clone(), subject.rest.clone());
     Contender {
         name: format!("peer: skinning, {BONES} bones, normals"),
-        is_yardstick: false,
+        role: Role::Measured,
         run: Box::new(move |round| {
             let pose = Skin::pose(BONES, 0.01 * (round % POSES) as f32);
             skin.run(&pose, black_box(&mut positions), black_box(&mut normals));
@@ -257,7 +298,7 @@ fn solvers<'c>(subject: &Subject) -> Vec<Contender<'c>> {
     #[cfg_attr(not(feature = "cholmod"), expect(unused_mut, reason = "grows with the feature"))]
     let mut solvers = vec![Contender {
         name: "peer: faer simplicial solve, f64".into(),
-        is_yardstick: false,
+        role: Role::Measured,
         run: Box::new(move |_| {
             solution.copy_from_slice(&start);
             faer.solve(black_box(&mut solution));
@@ -271,7 +312,7 @@ fn solvers<'c>(subject: &Subject) -> Vec<Contender<'c>> {
             let right = columns.clone();
             Some(Contender {
                 name: format!("peer: CHOLMOD {mode:?} solve, f64"),
-                is_yardstick: false,
+                role: Role::Measured,
                 run: Box::new(move |_| {
                     peer.right().copy_from_slice(&right);
                     black_box(peer.solve().expect("a factored matrix"));

@@ -38,10 +38,21 @@ impl Settings {
 pub struct Contender<'c> {
     /// For the table.
     pub name: String,
-    /// Whether ratios are to the fastest of these.
-    pub is_yardstick: bool,
+    /// What its figure is for.
+    pub role: Role,
     /// One frame or solve; the argument counts the rounds, so that no two frames are alike.
     pub run: Box<dyn FnMut(usize) + 'c>,
+}
+
+/// What the figure of a contender is for.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Role {
+    /// To be read by itself.
+    Measured,
+    /// Ratios are to the fastest of these.
+    Yardstick,
+    /// The contender of this name, on inputs full of denormals: its ratio to that one is printed.
+    FloodOf(String),
 }
 
 /// One table.
@@ -87,7 +98,7 @@ impl Contest<'_, '_> {
             .contenders
             .iter()
             .zip(&samples)
-            .filter(|(contender, _)| contender.is_yardstick)
+            .filter(|(contender, _)| contender.role == Role::Yardstick)
             .map(|(_, samples)| quantile(samples, 0.5))
             .fold(f64::INFINITY, f64::min);
         let caches = if self.cold { "cold" } else { "warm" };
@@ -100,6 +111,18 @@ impl Contest<'_, '_> {
                 contender.name,
                 p50 / yardstick
             );
+        }
+        let median_of = |name: &str| {
+            let place = self.contenders.iter().position(|contender| contender.name == name)?;
+            Some(quantile(&samples[place], 0.5))
+        };
+        for (contender, samples) in self.contenders.iter().zip(&samples) {
+            if let Role::FloodOf(name) = &contender.role
+                && let Some(ordinary) = median_of(name)
+            {
+                let ratio = quantile(samples, 0.5) / ordinary;
+                println!("{:>44}  x{ratio:.2} of {name}", contender.name);
+            }
         }
     }
 }

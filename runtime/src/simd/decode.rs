@@ -283,15 +283,29 @@ pub(super) fn plus_identity<L: Lanes>(mut a: Matrix<L>) -> Matrix<L> {
     a
 }
 
+/// Angles in radians and stretches nearer to zero are zero. Products of two that are left, and of one with such a product,
+/// are normal numbers: so are the gradients, whose denormals would cost many times their share of a frame.
+pub(crate) const FEATURE_FLUSH_BELOW: f32 = 1e-12;
+
+#[inline(always)]
+fn flushed<L: Lanes, const N: usize>(mut row: [L; N]) -> [L; N] {
+    let (limit, zero) = (L::splat(FEATURE_FLUSH_BELOW), L::splat(0.0));
+    for x in &mut row {
+        let magnitude = x.max(zero.sub(*x));
+        *x = magnitude.select_below(limit, zero, *x);
+    }
+    row
+}
+
 #[inline(always)]
 pub(super) fn log_rotation<L: Lanes>(scales: FeatureScales, x: &Row<L>) -> [L; 3] {
-    core::array::from_fn(|c| L::splat(scales.rotation).mul(x[c]))
+    flushed(core::array::from_fn(|c| L::splat(scales.rotation).mul(x[c])))
 }
 
 /// `S - I`.
 #[inline(always)]
 pub(super) fn stretch_less_identity<L: Lanes>(scales: FeatureScales, x: &Row<L>) -> Matrix<L> {
-    let s: [L; 6] = core::array::from_fn(|c| L::splat(scales.stretch).mul(x[3 + c]));
+    let s: [L; 6] = flushed(core::array::from_fn(|c| L::splat(scales.stretch).mul(x[3 + c])));
     [[s[0], s[1], s[2]], [s[1], s[3], s[4]], [s[2], s[4], s[5]]]
 }
 

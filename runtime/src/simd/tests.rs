@@ -171,6 +171,34 @@ fn weights_without_measure_saturate() {
 }
 
 #[test]
+fn no_denormal_leaves_decode() {
+    /// Far from the denormals, which begin at 1.2e-38: what follows may multiply once more.
+    const SOUND_FROM: f32 = 1e-30;
+    let is_sound = |x: &f32| *x == 0.0 || x.abs() >= SOUND_FROM;
+    // Of a block without a bias, so that nothing lifts what is tiny.
+    let mut case = Case::new(53);
+    case.blocks
+        .iter_mut()
+        .for_each(|block| block.bias = [0.0; FEATURE_COUNT]);
+    for kernels in present() {
+        for exponent in (-44..=0).map(|e| 10_f32.powi(e)) {
+            let factors = [exponent, -0.3 * exponent, 0.7 * exponent, 1e-3 * exponent, -exponent];
+            let found = case.decode(kernels, &shares(factors), true, vec![ANY; 53]);
+            let numbers = found.as_flattened().as_flattened();
+            assert!(numbers.iter().all(is_sound), "{kernels:?} {exponent}");
+            let mut features = [[0.0; GROUP_NODES]; FEATURE_COUNT];
+            for (n, x) in features.as_flattened_mut().iter_mut().enumerate() {
+                *x = exponent * ((n % 7) as f32 - 3.0);
+            }
+            let mut found = [ANY; GROUP_NODES];
+            kernels.gradients(SCALES, &features, &mut found);
+            let numbers = found.as_flattened().as_flattened();
+            assert!(numbers.iter().all(is_sound), "{kernels:?} {exponent}");
+        }
+    }
+}
+
+#[test]
 fn groups_that_nothing_changed_stay() {
     let mut own = shares([0.5, 0.25, 0.0, 0.0, 0.75]);
     own.iter_mut().for_each(|share| share.changed = 0);

@@ -22,6 +22,8 @@ pub const COMPONENTS: usize = COARSE + COARSE * FINE;
 const FAST_VERTICES_MAX: usize = 13_000;
 /// Share of the vertices that a coarse component moves, and a fine one: 10 * 0.25 + 50 * 0.09 = 7 entries a vertex.
 const SHARES: [f64; 2] = [0.25, 0.09];
+/// Range of the biases.
+const BIAS: f32 = 0.1;
 
 /// A mesh and its packages.
 #[derive(Debug, Clone)]
@@ -59,7 +61,7 @@ impl Subject {
 
     /// Any mesh with made-up components.
     pub fn of_mesh(name: String, rest: Vec<[f32; 3]>, faces: Vec<[u32; 3]>) -> Self {
-        let compact = compact(&rest, &faces);
+        let compact = compact(&rest, &faces, BIAS);
         Self::of_package(name, compact)
     }
 
@@ -80,6 +82,13 @@ impl Subject {
             baked,
             compact: compact.clone(),
         }
+    }
+
+    /// A baked package of the mesh whose made-up network has no biases; without a fast tier.
+    pub fn without_bias(&self) -> AlignedBytes {
+        let compact = compact(&self.rest, &self.faces, 0.0);
+        let view = CompactView::open(&compact).expect("a sound package");
+        bake(&view).expect("a mesh that can be baked")
     }
 
     /// The surface that the baker sees.
@@ -150,7 +159,7 @@ impl Noise {
 }
 
 /// A made-up network over the mesh.
-fn compact(rest: &[[f32; 3]], faces: &[[u32; 3]]) -> AlignedBytes {
+fn compact(rest: &[[f32; 3]], faces: &[[u32; 3]], bias: f32) -> AlignedBytes {
     let wide = widened(rest);
     let topology = Topology::new(faces, &wide);
     let mut noise = Noise(1);
@@ -162,7 +171,7 @@ fn compact(rest: &[[f32; 3]], faces: &[[u32; 3]]) -> AlignedBytes {
                 core::array::from_fn(|j| f32::from(i == j) + 0.05 * (noise.next() as f32 - 0.5))
             }),
             neighbour: core::array::from_fn(|_| core::array::from_fn(|_| 0.05 * (noise.next() as f32 - 0.5))),
-            bias: core::array::from_fn(|_| 0.1 * (noise.next() as f32 - 0.5)),
+            bias: core::array::from_fn(|_| bias * (noise.next() as f32 - 0.5)),
         };
         let (encoder, decoder) = (conv(), conv());
         blocks.push(BlockRecord {
