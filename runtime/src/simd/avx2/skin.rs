@@ -67,7 +67,7 @@ fn load_map(map: &Map) -> [__m256; 2] {
 
 /// Weights as shares of one.
 #[target_feature(enable = "avx2")]
-pub(in crate::simd) fn load_weights(weights: &[u16; SKIN_NODES]) -> __m128 {
+fn load_weights(weights: &[u16; SKIN_NODES]) -> __m128 {
     // SAFETY: four halves of a word are eight bytes.
     let bits = unsafe { _mm_loadl_epi64(weights.as_ptr().cast()) };
     _mm_mul_ps(_mm_cvtepi32_ps(_mm_cvtepu16_epi32(bits)), _mm_set1_ps(UNIT))
@@ -75,13 +75,13 @@ pub(in crate::simd) fn load_weights(weights: &[u16; SKIN_NODES]) -> __m128 {
 
 /// x y z and zero.
 #[target_feature(enable = "avx2")]
-pub(in crate::simd) fn load_point(point: &[f32; 3]) -> __m128 {
+fn load_point(point: &[f32; 3]) -> __m128 {
     let [x, y, z] = *point;
     _mm_setr_ps(x, y, z, 0.0)
 }
 
 /// The box of what was stored, and whether all of it was finite.
-pub(in crate::simd) struct Extent {
+struct Extent {
     least: __m128,
     greatest: __m128,
     /// Set lanes have held what is not finite.
@@ -90,7 +90,7 @@ pub(in crate::simd) struct Extent {
 
 impl Extent {
     #[target_feature(enable = "avx2")]
-    pub(in crate::simd) fn new() -> Self {
+    fn new() -> Self {
         Self {
             least: _mm_set1_ps(f32::INFINITY),
             greatest: _mm_set1_ps(f32::NEG_INFINITY),
@@ -100,7 +100,7 @@ impl Extent {
 
     /// Writes x y z and zero, and x y z.
     #[target_feature(enable = "avx2")]
-    pub(in crate::simd) fn store(&mut self, point: __m128, posed: &mut Lane, position: &mut [f32; 3]) {
+    fn store(&mut self, point: __m128, posed: &mut Lane, position: &mut [f32; 3]) {
         // SAFETY: a lane is four floats.
         unsafe { _mm_storeu_ps(posed.as_mut_ptr(), point) }
         *position = [posed[0], posed[1], posed[2]];
@@ -113,7 +113,7 @@ impl Extent {
 
     /// Nothing where something was not finite.
     #[target_feature(enable = "avx2")]
-    pub(in crate::simd) fn bounds(&self) -> Option<Bounds> {
+    fn bounds(&self) -> Option<Bounds> {
         let point = |lanes: __m128| {
             let mut point = [0.0; 4];
             // SAFETY: a lane is four floats.

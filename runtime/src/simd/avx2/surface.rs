@@ -53,28 +53,31 @@ fn area(posed: &[[f32; 4]], centre: &[[f32; 4]; FAN_VERTICES], fan: &[[u32; FAN_
     const TURN: i32 = 0xc9;
     // SAFETY: eight numbers from the first and the third vertex on, and four below.
     let centre = [0, 2].map(|n| unsafe { _mm256_loadu_ps(centre[n..n + 2].as_ptr().cast()) });
-    let edges = |step: &[u32; FAN_VERTICES]| {
+    let points = |step: &[u32; FAN_VERTICES]| {
         let [a, b, c, d] = step.map(|lane| unsafe { _mm_loadu_ps(posed[lane as usize].as_ptr()) });
-        [
-            _mm256_sub_ps(_mm256_set_m128(b, a), centre[0]),
-            _mm256_sub_ps(_mm256_set_m128(d, c), centre[1]),
-        ]
+        [_mm256_set_m128(b, a), _mm256_set_m128(d, c)]
     };
     let mut sum = [_mm256_setzero_ps(); 2];
-    let Some((first, rest)) = fan.split_first() else {
-        return sum;
-    };
-    let mut a = edges(first);
-    let mut a_turned = a.map(|a| _mm256_permute_ps::<TURN>(a));
-    for step in rest {
-        let b = edges(step);
-        let b_turned = b.map(|b| _mm256_permute_ps::<TURN>(b));
+    let mut add = |a: [__m256; 2], b: [__m256; 2], c: [__m256; 2]| {
         for n in 0..2 {
-            // No fused product: two equal edges must give zero.
-            let cross = _mm256_sub_ps(_mm256_mul_ps(a[n], b_turned[n]), _mm256_mul_ps(a_turned[n], b[n]));
+            let (edge, across) = (_mm256_sub_ps(b[n], centre[n]), _mm256_sub_ps(c[n], a[n]));
+            let (edge_turned, across_turned) = (_mm256_permute_ps::<TURN>(edge), _mm256_permute_ps::<TURN>(across));
+            // No fused product: along a line it must give zero.
+            let cross = _mm256_sub_ps(_mm256_mul_ps(edge, across_turned), _mm256_mul_ps(edge_turned, across));
             sum[n] = _mm256_add_ps(sum[n], cross);
         }
-        (a, a_turned) = (b, b_turned);
+    };
+    if let Some((first, rest)) = fan.split_first() {
+        let mut a = points(first);
+        let (pairs, last) = rest.as_chunks::<2>();
+        for [b, c] in pairs {
+            let c = points(c);
+            add(a, points(b), c);
+            a = c;
+        }
+        if let [b] = last {
+            add(a, points(b), centre);
+        }
     }
     sum
 }

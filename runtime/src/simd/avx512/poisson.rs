@@ -68,7 +68,7 @@ fn substitute_avx512(factor: &Factor<'_>, x: &mut [Block]) {
 
 /// Quarter n of the result is the sum of the quarters of vector n.
 #[target_feature(enable = "avx512f")]
-fn quarters_summed(vectors: [__m512; 4]) -> __m512 {
+pub(super) fn quarters_summed(vectors: [__m512; 4]) -> __m512 {
     let halves = |a, b| {
         let (low, high) = (_mm512_shuffle_f32x4::<0x44>(a, b), _mm512_shuffle_f32x4::<0xee>(a, b));
         _mm512_add_ps(low, high)

@@ -101,26 +101,25 @@ pub(crate) fn normals_from(first: usize, around: &Around<'_>, posed: &[[f32; 4]]
     }
 }
 
-/// Twice the area vectors of the triangles of one walk.
+/// Twice the area vectors of the triangles of one walk, two at a time: for steps a b c around p their sum is
+/// `(b - p) x (c - a)`. Where a last b is left, c is p.
 fn area(posed: &[[f32; 4]], centre: usize, mut walk: impl Iterator<Item = u32>) -> [f32; 3] {
+    let difference = |q: [f32; 4], p: [f32; 4]| [q[0] - p[0], q[1] - p[1], q[2] - p[2]];
     let p = posed[centre];
-    let edge = |lane: u32| {
-        let q = posed[lane as usize];
-        [q[0] - p[0], q[1] - p[1], q[2] - p[2]]
-    };
     let mut sum = [0.0; 3];
     let Some(first) = walk.next() else {
         return sum;
     };
-    let mut a = edge(first);
-    for lane in walk {
-        let b = edge(lane);
-        for c in 0..3 {
-            let (i, j) = ((c + 1) % 3, (c + 2) % 3);
-            // No fused product: two equal edges must give zero.
-            sum[c] += a[i] * b[j] - a[j] * b[i];
+    let mut a = posed[first as usize];
+    while let Some(b) = walk.next() {
+        let c = walk.next().map_or(p, |lane| posed[lane as usize]);
+        let (edge, across) = (difference(posed[b as usize], p), difference(c, a));
+        for n in 0..3 {
+            let (i, j) = ((n + 1) % 3, (n + 2) % 3);
+            // No fused product: along a line it must give zero.
+            sum[n] += edge[i] * across[j] - edge[j] * across[i];
         }
-        a = b;
+        a = c;
     }
     sum
 }
