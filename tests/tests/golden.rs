@@ -43,7 +43,7 @@ fn describe_compact(view: &CompactView<'_>) -> String {
     let mut text = String::new();
     let mut line = |name: &str, value: &dyn Debug| writeln!(text, "{name} = {value:?}").unwrap();
     line("rest_positions", &view.rest_positions());
-    line("faces", &view.faces());
+    line("faces", &view.faces().to_vec());
     line("bridges", &view.bridges());
     line("anchor_vertex", &view.anchor_vertex());
     line("rotation_scale", &view.rotation_scale());

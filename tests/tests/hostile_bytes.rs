@@ -161,7 +161,8 @@ fn try_changed(kind: PackageKind, package: &mut AlignedBytes, fates: &mut Fates)
 /// Follows every index as the baker does.
 fn use_compact(view: &CompactView<'_>) {
     let rest = view.rest_positions();
-    let corners = view.faces().as_flattened().iter().chain(view.bridges().as_flattened());
+    let faces = view.faces().to_vec();
+    let corners = faces.as_flattened().iter().chain(view.bridges().as_flattened());
     assert!(
         corners
             .chain([&view.anchor_vertex()])

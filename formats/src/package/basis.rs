@@ -3,7 +3,7 @@
 
 use rkyv::{Archive, Serialize, with::InlineAsBox};
 
-use super::{FEATURE_COUNT, RenderMesh};
+use super::{AsShortAsFit, FEATURE_COUNT, RenderMesh};
 
 /// What the trainer learned, small enough to ship: V vertices, F faces, B blocks, K components.
 #[derive(Archive, Serialize, Debug)]
@@ -12,7 +12,7 @@ pub struct CompactBasis<'a> {
     #[rkyv(with = InlineAsBox)]
     pub rest_positions: &'a [[f32; 3]],
     /// Triangles, counter-clockwise. Shape: `[F]`; every index < V.
-    #[rkyv(with = InlineAsBox)]
+    #[rkyv(with = AsShortAsFit)]
     pub faces: &'a [[u32; 3]],
     /// Extra edges `[from, to]` that tie separate pieces and loose vertices to the rest, sorted, `from < to`.
     #[rkyv(with = InlineAsBox)]

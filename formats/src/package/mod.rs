@@ -5,6 +5,7 @@ mod baked;
 mod baked_view;
 mod basis;
 mod error;
+mod faces;
 #[cfg(feature = "alloc")]
 mod fans;
 #[cfg(feature = "std")]
@@ -34,6 +35,7 @@ pub use basis::{
     ArchivedQuality, BlockRecord, CompactBasis, ComponentRecord, GraphConvRecord, Provenance, Quality,
 };
 pub use error::OpenError;
+pub use faces::{AsShortAsFit, Faces};
 #[cfg(feature = "alloc")]
 pub use fans::Fans;
 #[cfg(feature = "std")]

@@ -5,7 +5,7 @@ use rkyv::{api::low::access, boxed::ArchivedBox, rancor::Failure};
 
 use super::{
     ArchivedBlockRecord, ArchivedCompactBasis, ArchivedGraphConvRecord, BlockRecord, ComponentRecord, FEATURE_COUNT,
-    GraphConvRecord, Header, OpenError, PackageKind, Provenance, Quality, RenderMesh, render, rules,
+    Faces, GraphConvRecord, Header, OpenError, PackageKind, Provenance, Quality, RenderMesh, render, rules,
 };
 
 #[cfg(target_endian = "big")]
@@ -80,8 +80,11 @@ impl<'a> CompactView<'a> {
     }
 
     /// Shape: `[F]`, each index < V.
-    pub fn faces(&self) -> &'a [[u32; 3]] {
-        native(&self.archived.faces)
+    pub fn faces(&self) -> Faces<'a> {
+        Faces {
+            wide: native(&self.archived.faces.0),
+            short: native(&self.archived.faces.1),
+        }
     }
 
     /// Sorted, `from < to < V`.

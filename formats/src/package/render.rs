@@ -39,11 +39,16 @@ pub(super) fn view<'a>(archived: &'a ArchivedRenderMesh<'static>) -> RenderMesh<
 }
 
 /// Proves every promise that [`RenderMesh`] makes, for the triangles of a package.
-pub(super) fn check(render: &RenderMesh<'_>, faces: &[[u32; 3]], vertex_count: usize) -> Result<(), OpenError> {
+pub(super) fn check(
+    render: &RenderMesh<'_>,
+    face_count: usize,
+    faces: impl Iterator<Item = [u32; 3]>,
+    vertex_count: usize,
+) -> Result<(), OpenError> {
     let count = render.vertices.len();
     rules::count("render.vertices", count, 0, limits::RENDER_VERTICES)?;
     rules::same_count("render.uvs", render.uvs.len(), count)?;
-    let face_count = if count == 0 { 0 } else { faces.len() };
+    let face_count = if count == 0 { 0 } else { face_count };
     rules::same_count("render.faces", render.faces.len(), face_count)?;
     for (r, &vertex) in render.vertices.iter().enumerate() {
         rules::below("render.vertices", r, vertex, vertex_count)?;
@@ -55,7 +60,7 @@ pub(super) fn check(render: &RenderMesh<'_>, faces: &[[u32; 3]], vertex_count: u
         for &corner in corners {
             rules::below("render.faces", f, corner, count)?;
         }
-        if corners.map(|r| render.vertices[r as usize]) != *face {
+        if corners.map(|r| render.vertices[r as usize]) != face {
             return Err(OpenError::RenderFaceDiffers { face: f });
         }
     }

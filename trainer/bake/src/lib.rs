@@ -131,7 +131,7 @@ pub fn bake_with(package: &CompactView<'_>, options: &BakeOptions) -> Result<Ali
         &folded,
         &block_of_component,
     )?;
-    let fans = Fans::gather(package.faces(), &exact.lane_from_node);
+    let fans = Fans::gather(&surface.topology.faces, &exact.lane_from_node);
     let blocks: Vec<BakedBlock> = package
         .blocks()
         .map(|block| BakedBlock {
@@ -172,7 +172,7 @@ pub fn bake_with(package: &CompactView<'_>, options: &BakeOptions) -> Result<Ali
     };
     write_baked(&BakedBasis {
         compact_id: package.content_id(),
-        faces: package.faces(),
+        faces: &surface.topology.faces,
         lane_from_vertex: &exact.lane_from_node,
         vertex_from_lane: &exact.node_from_lane,
         rotation_scale: package.rotation_scale(),

@@ -21,7 +21,7 @@ impl Surface {
     /// Rebuilds the surface that the trainer had.
     pub fn of_package(package: &CompactView<'_>) -> Self {
         let rest = widened(package.rest_positions());
-        let topology = Topology::with_bridges(package.faces(), &rest, package.bridges());
+        let topology = Topology::with_bridges(&package.faces().to_vec(), &rest, package.bridges());
         let weights = EdgeWeights::new(&topology, &rest);
         Self {
             rest,

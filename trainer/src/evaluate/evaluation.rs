@@ -174,7 +174,7 @@ pub fn evaluate(
         })
         .collect::<Result<_, _>>()?;
 
-    let faces = package.faces();
+    let faces = package.faces().to_vec();
     let truth: Vec<Vec<[f32; 3]>> = input
         .test_shapes
         .iter()
@@ -217,10 +217,10 @@ pub fn evaluate(
             coarse,
             fine: package.component_count() - coarse,
         },
-        encoder: score(&found.truth, &found.encoder, faces)?,
-        feature_projection: score(&found.truth, &found.feature_projection, faces)?,
-        position_projection: score(&found.truth, &found.position_projection, faces)?,
-        round_trip: score(&found.truth, &round_trip, faces)?,
+        encoder: score(&found.truth, &found.encoder, &faces)?,
+        feature_projection: score(&found.truth, &found.feature_projection, &faces)?,
+        position_projection: score(&found.truth, &found.position_projection, &faces)?,
+        round_trip: score(&found.truth, &round_trip, &faces)?,
         max_percentage_error,
     };
     Ok((evaluation, found))
@@ -235,8 +235,8 @@ fn check(input: &EvaluationInput<'_>, package: &CompactView<'_>) -> Result<(), E
         });
     }
     let (faces, known) = (&input.sequence.faces, package.faces());
-    if faces != known {
-        let face = faces.iter().zip(known).take_while(|(a, b)| a == b).count();
+    if !known.iter().eq(faces.iter().copied()) {
+        let face = faces.iter().zip(known.iter()).take_while(|(a, b)| **a == *b).count();
         return Err(EvaluationError::Faces { face });
     }
     let shape_count = input.sequence.shape_count();

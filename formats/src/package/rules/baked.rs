@@ -13,7 +13,7 @@ use super::{
 /// Proves every promise that [`super::super::BakedBasis`] makes.
 pub(in super::super) fn check(view: &BakedView<'_>) -> Result<(), OpenError> {
     let vertex_count = positions(view.exact().rest_positions(), 3)?;
-    faces(view.faces(), vertex_count)?;
+    faces(view.faces().len(), view.faces().iter().copied(), vertex_count)?;
     permutation(
         ["lane_from_vertex", "vertex_from_lane"],
         [view.lane_from_vertex(), view.vertex_from_lane()],
@@ -48,7 +48,12 @@ pub(in super::super) fn check(view: &BakedView<'_>) -> Result<(), OpenError> {
     if let Some(fast) = view.fast() {
         fast_tier(view, &fast, vertex_count)?;
     }
-    render::check(&view.render_mesh(), view.faces(), vertex_count)
+    render::check(
+        &view.render_mesh(),
+        view.faces().len(),
+        view.faces().iter().copied(),
+        vertex_count,
+    )
 }
 
 fn fast_tier(view: &BakedView<'_>, fast: &FastView<'_>, vertex_count: usize) -> Result<(), OpenError> {

@@ -2,12 +2,15 @@
 
 use super::{
     super::{CompactView, GraphConvRecord, OpenError, limits, render},
-    BlockLinks, below, control, count, finite_halves, mesh, names, positive, same_count, title, tree, within,
+    BlockLinks, below, control, count, faces, finite_halves, names, positions, positive, same_count, title, tree,
+    within,
 };
 
 /// Proves every promise that [`super::super::CompactBasis`] makes.
 pub(in super::super) fn check(view: &CompactView<'_>) -> Result<(), OpenError> {
-    let vertex_count = mesh(view.rest_positions(), view.faces())?;
+    let triangles = view.faces();
+    let vertex_count = positions(view.rest_positions(), 3)?;
+    faces(triangles.len(), triangles.iter(), vertex_count)?;
     bridges(view.bridges(), vertex_count)?;
     below("anchor_vertex", 0, view.anchor_vertex(), vertex_count)?;
     positive("rotation_scale", 0, view.rotation_scale(), limits::FEATURE_SCALE)?;
@@ -40,7 +43,7 @@ pub(in super::super) fn check(view: &CompactView<'_>) -> Result<(), OpenError> {
     supports(view, vertex_count)?;
     provenance(view)?;
     quality(view)?;
-    render::check(&view.render_mesh(), view.faces(), vertex_count)
+    render::check(&view.render_mesh(), triangles.len(), triangles.iter(), vertex_count)
 }
 
 fn bridges(bridges: &[[u32; 2]], vertex_count: usize) -> Result<(), OpenError> {

@@ -121,13 +121,6 @@ fn offsets(field: &'static str, offsets: &[u32], row_count: usize, entry_count: 
     }
 }
 
-/// Rest shape and triangles; gives V.
-fn mesh(rest_positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Result<usize, OpenError> {
-    let vertex_count = positions(rest_positions, 3)?;
-    faces(triangles, vertex_count)?;
-    Ok(vertex_count)
-}
-
 /// At least `least` rest positions, finite and near enough; gives their count.
 fn positions(rest_positions: &[[f32; 3]], least: usize) -> Result<usize, OpenError> {
     count("rest_positions", rest_positions.len(), least, limits::VERTICES)?;
@@ -139,10 +132,11 @@ fn positions(rest_positions: &[[f32; 3]], least: usize) -> Result<usize, OpenErr
     Ok(rest_positions.len())
 }
 
-fn faces(triangles: &[[u32; 3]], vertex_count: usize) -> Result<(), OpenError> {
-    count("faces", triangles.len(), 1, limits::FACES)?;
-    for (f, corners) in triangles.iter().enumerate() {
-        for &vertex in corners {
+/// At least one triangle, and corners that are vertices.
+fn faces(face_count: usize, triangles: impl Iterator<Item = [u32; 3]>, vertex_count: usize) -> Result<(), OpenError> {
+    count("faces", face_count, 1, limits::FACES)?;
+    for (f, corners) in triangles.enumerate() {
+        for vertex in corners {
             below("faces", f, vertex, vertex_count)?;
         }
     }
