@@ -70,13 +70,17 @@ impl Fast {
         let nodes = strained.farthest_points(source.anchor_vertex, node_count);
         let skin = Skin::fit(source, &surface, &nodes, &exact);
 
-        let graph = NodeGraph::new(source.surface, &skin, nodes.len());
-        let laplacian = graph.laplacian();
-        let order = EliminationOrder::new(&laplacian)?;
-        let components = at_nodes(source, &nodes, &order.solver_from_vertex);
         let rest: Vec<[f32; 3]> = nodes.iter().map(|&v| source.rest_positions[v as usize]).collect();
         let blocks = source.network.block_of_component();
-        let tier = Tier::new(&laplacian, order, &rest, &components, &blocks)?;
+        let tier_on = |graph: &NodeGraph| {
+            let laplacian = graph.laplacian();
+            let order = EliminationOrder::new(&laplacian)?;
+            let components = at_nodes(source, &nodes, &order.solver_from_vertex);
+            Tier::new(&laplacian, order, &rest, &components, &blocks).map(|tier| (tier, components))
+        };
+        let graph = NodeGraph::new(source.surface, &skin, nodes.len());
+        // Where parts hang together by negligible edges alone, all are wanted.
+        let (tier, components) = tier_on(&graph.without_negligible()).or_else(|_| tier_on(&graph))?;
 
         let in_lanes = |row: [u16; SKIN_NODES]| row.map(|node| tier.lane_from_node[usize::from(node)] as u16);
         let vertices = || source.exact.node_from_lane.iter().map(|&v| v as usize);

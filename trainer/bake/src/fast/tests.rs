@@ -3,6 +3,7 @@
 use rayon::ThreadPoolBuilder;
 use sinew_formats::package::{BakedView, CompactView, FEATURE_COUNT, SKIN_WEIGHT_SUM};
 
+use super::graph::NEGLIGIBLE;
 use crate::{BakeOptions, FastNodes, bake_bytes_with, fixture};
 
 fn baked(seed: u64, vertices_a_node: u32) -> sinew_formats::package::AlignedBytes {
@@ -41,7 +42,7 @@ fn nodes_are_vertices_with_their_components() {
     assert_eq!(sorted(found.collect()), sorted(expected.collect()));
 }
 
-/// `W^T L W`, entry by entry, from the stored skin and the exact tier's rings.
+/// `W^T L W` but for what is negligible, entry by entry, from the stored skin and the exact tier's rings.
 #[test]
 fn the_graphs_weights_are_the_galerkin_product() {
     /// Stored in f32, of weights near one.
@@ -71,14 +72,22 @@ fn the_graphs_weights_are_the_galerkin_product() {
         }
     }
     let nodes = fast.nodes();
+    let sum = |a: usize| {
+        (0..node_count)
+            .filter(|&b| b != a)
+            .map(|b| product[a][b].abs())
+            .sum::<f64>()
+    };
     for a in 0..node_count {
         let row = nodes.ring_offsets()[a] as usize..nodes.ring_offsets()[a + 1] as usize;
         for b in (0..node_count).filter(|&b| b != a) {
             let stored = nodes.ring()[row.clone()]
                 .binary_search(&(b as u32))
                 .map_or(0.0, |place| f64::from(nodes.ring_weights()[row.start + place]));
+            let negligible = NEGLIGIBLE * sum(a).min(sum(b));
+            let left_out = stored == 0.0 && product[a][b].abs() < negligible + TOLERANCE;
             assert!(
-                (stored + product[a][b]).abs() < TOLERANCE,
+                left_out || (stored + product[a][b]).abs() < TOLERANCE,
                 "{a} {b}: {stored} {}",
                 product[a][b]
             );
@@ -95,8 +104,8 @@ fn more_nodes_are_nearer_to_the_exact_tier() {
     let [coarse, fine, own] = errors;
     assert!(fine.mixed_rms < 0.7 * coarse.mixed_rms, "{errors:?}");
     assert!(fine.normal_rms < coarse.normal_rms, "{errors:?}");
-    // Every vertex a node: the tiers are one, but for the rounding of the factors.
-    assert!(own.mixed_max < 1e-5 && own.single_max < 1e-5, "{errors:?}");
+    // Every vertex a node: the tiers are one, but for negligible edges.
+    assert!(own.mixed_max < 5e-4 && own.single_max < 5e-4, "{errors:?}");
     for error in errors {
         assert!(error.mixed_rms <= error.mixed_p99 && error.mixed_p99 <= error.mixed_max);
         assert!(error.single_rms <= error.single_max);
