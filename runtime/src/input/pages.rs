@@ -10,6 +10,7 @@ use core::ops::Range;
 use super::map::{Command, ControlMap};
 use super::response::Response;
 use super::takeover::Takeover;
+use crate::basis::{Basis, Component};
 
 /// Which knobs follow the tree, and how their controls answer.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,6 +44,21 @@ impl Default for TreePages {
 }
 
 impl TreePages {
+    /// Coarse and fine knobs out of `knob_count`: three eighths are coarse, as on a box of eight, but never more than there
+    /// are coarse components, and all of them where no component has children.
+    pub fn share(basis: &Basis<'_>, knob_count: u16) -> (u16, u16) {
+        let knob_count = knob_count.max(1);
+        let is_coarse = |component: &Component<'_>| component.parent.is_none();
+        let coarse_components = basis.components().filter(is_coarse).count();
+        if coarse_components == basis.component_count() {
+            return (knob_count, 0);
+        }
+        let share = u32::from(knob_count) * 3 / 8;
+        // The format allows 4,096 components.
+        let coarse = (share as u16).clamp(1, (coarse_components as u16).max(1));
+        (coarse, knob_count - coarse)
+    }
+
     /// Indices of its knobs.
     pub(crate) fn knobs(&self) -> Range<usize> {
         let first = usize::from(self.first_knob);
@@ -189,6 +205,18 @@ mod tests {
         let before = view;
         view.apply(&map, &tree, Command::Focus(u16::MAX));
         assert_eq!(view, before, "no such component");
+    }
+
+    #[test]
+    fn knobs_are_shared_between_coarse_and_fine() {
+        let package = Package::small(1);
+        let basis = open(&package);
+        let shares = [0, 1, 2, 3, 8, u16::MAX].map(|knob_count| TreePages::share(&basis, knob_count));
+        assert_eq!(
+            shares,
+            [(1, 0), (1, 0), (1, 1), (1, 2), (2, 6), (2, u16::MAX - 2)],
+            "two coarse components"
+        );
     }
 
     #[test]
