@@ -12,7 +12,7 @@ use crate::handle::{Body, Handle, Kind, Shared};
 use crate::memory::{Access, Out, Region, Regions, SinewLayout, array, handle_memory, present};
 use crate::status::SinewStatus;
 use crate::structs::{GrowingStruct, StructOut};
-use crate::version::SINEW_ABI_VERSION;
+use crate::version::check_abi;
 
 /// Bytes of a buffer that holds any control's name, with the NUL.
 pub const SINEW_NAME_BYTES: usize = 65;
@@ -36,6 +36,13 @@ impl Body for BasisBody {
     const KIND: Kind = Kind::Basis;
 }
 
+impl BasisBody {
+    /// Where the package lies.
+    pub(crate) fn package(&self) -> Region {
+        self.package
+    }
+}
+
 /// What a package holds. Set `struct_bytes` to `sizeof(SinewBasisInfo)` before the call.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
@@ -54,12 +61,25 @@ pub struct SinewBasisInfo {
     pub content_id: [u8; 16],
     /// Identity of the compact package that this one was baked from.
     pub compact_id: [u8; 16],
+    /// Nodes of the fast tier; 0: the package has none.
+    pub fast_node_count: u32,
+    /// R: vertices of the render mesh, split where texture coordinates do; V where the package has none.
+    pub render_vertex_count: u32,
+    /// Whether the package has texture coordinates: 0 or 1.
+    pub has_texture: u32,
+    /// Root mean square distance of the fast tier from the exact one in mixed poses, as a share of the diagonal of the
+    /// rest shape's bounding box; measured when the package was baked. 0 without fast tier.
+    pub fast_error_rms: f32,
+    /// Greatest such distance. 0 without fast tier.
+    pub fast_error_max: f32,
+    /// Root mean square angle between the normals of both tiers in those poses, radians. 0 without fast tier.
+    pub fast_error_normals: f32,
 }
 
-// SAFETY: `repr(C)`, the size first, integers only.
+// SAFETY: `repr(C)`, the size first, numbers only.
 unsafe impl GrowingStruct for SinewBasisInfo {
     const NAME: &'static str = "info";
-    const FIRST_BYTES: usize = size_of::<Self>();
+    const FIRST_BYTES: usize = core::mem::offset_of!(Self, fast_node_count);
 }
 
 /// Adds handle and package to the regions; nothing a call writes may lie in them.
@@ -122,12 +142,7 @@ pub unsafe extern "C" fn sinew_basis_open(
     details: *mut SinewDetails,
 ) -> SinewStatus {
     let open = |regions: &mut Regions| {
-        if abi_version != SINEW_ABI_VERSION {
-            return Err(Fault::WrongAbi {
-                expected: SINEW_ABI_VERSION,
-                actual: abi_version,
-            });
-        }
+        check_abi(abi_version)?;
         let layout = Handle::<BasisBody>::layout(0);
         array(bytes, length, length, "bytes", Access::Read, regions)?;
         let package = Region::new(bytes, length, "package", Access::Read)?;
@@ -181,6 +196,12 @@ pub unsafe extern "C" fn sinew_basis_info(basis: *const SinewBasis, info: *mut S
             level_count: deepest.map_or(0, |level| level + 1),
             content_id: basis.id(),
             compact_id: basis.compact_id(),
+            fast_node_count: basis.fast_node_count().unwrap_or(0) as u32,
+            render_vertex_count: basis.render_vertex_count() as u32,
+            has_texture: (!basis.render_mesh().vertices.is_empty()).into(),
+            fast_error_rms: basis.fast_error().map_or(0.0, |error| error.mixed_rms),
+            fast_error_max: basis.fast_error().map_or(0.0, |error| error.mixed_max),
+            fast_error_normals: basis.fast_error().map_or(0.0, |error| error.normal_rms),
         });
         Ok(())
     })
@@ -201,13 +222,54 @@ pub unsafe extern "C" fn sinew_basis_faces(
     indices: *mut *const u32,
     index_count: *mut usize,
 ) -> SinewStatus {
+    // SAFETY: the caller's promise.
+    unsafe { triangles(basis, indices, index_count, |basis| basis.faces()) }
+}
+
+/// The triangles of the render mesh, whose vertices `sinew_vertices_write` writes: those of `sinew_basis_faces` where the
+/// package has no texture coordinates.
+///
+/// `indices` takes a pointer into the package, good as long as the package stands; `index_count` takes 3 F.
+///
+/// Errors: those of a handle; `OVERLAP`.
+/// Threads: any number at a time.
+///
+/// # Safety
+/// `basis` is NULL or a basis; the others are NULL or writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_basis_render_faces(
+    basis: *const SinewBasis,
+    indices: *mut *const u32,
+    index_count: *mut usize,
+) -> SinewStatus {
+    // SAFETY: the caller's promise.
+    unsafe {
+        triangles(basis, indices, index_count, |basis| {
+            let render = basis.render_mesh();
+            if render.vertices.is_empty() {
+                basis.faces()
+            } else {
+                render.faces
+            }
+        })
+    }
+}
+
+/// # Safety
+/// As for the functions above.
+unsafe fn triangles(
+    basis: *const SinewBasis,
+    indices: *mut *const u32,
+    index_count: *mut usize,
+    faces: impl FnOnce(&Basis<'static>) -> &'static [[u32; 3]],
+) -> SinewStatus {
     edge(|| {
         let regions = &mut Regions::new();
         let pointer = Out::required(indices, "indices", regions)?;
         let count = Out::required(index_count, "index_count", regions)?;
         // SAFETY: the caller's promise.
         let shared = unsafe { share_basis(basis, regions)? };
-        let faces = shared.basis.faces().as_flattened();
+        let faces = faces(&shared.basis).as_flattened();
         // SAFETY: the caller's promise, both.
         unsafe {
             pointer.write(faces.as_ptr());

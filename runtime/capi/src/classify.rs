@@ -1,6 +1,7 @@
 //! From a fault to its status: one each, named alike where the fault is one of a package.
 
-use sinew_runtime::{ControlError, FrameError, OpenError};
+use sinew_runtime::input::MapError;
+use sinew_runtime::{ControlError, FrameError, HandleError, OpenError, OutputError, WorkspaceError};
 
 use crate::fault::Fault;
 use crate::status::SinewStatus;
@@ -10,11 +11,11 @@ impl Fault {
         match *self {
             Self::Null { .. } => SinewStatus::NullPointer,
             Self::Misaligned { .. } => SinewStatus::Misaligned,
-            Self::TooShort { .. } | Self::Workspace(_) => SinewStatus::TooShort,
+            Self::TooShort { .. } => SinewStatus::TooShort,
             Self::TooLong { .. } => SinewStatus::TooLong,
             Self::Overlap { .. } => SinewStatus::Overlap,
-            Self::StructSize { .. } => SinewStatus::StructSize,
-            Self::UnknownOption { .. } => SinewStatus::UnknownOption,
+            Self::StructSize { .. } | Self::ElementSize { .. } => SinewStatus::StructSize,
+            Self::UnknownOption { .. } | Self::UnknownChoice { .. } => SinewStatus::UnknownOption,
             Self::WrongAbi { .. } => SinewStatus::WrongAbi,
             Self::NotAHandle { .. } => SinewStatus::NotAHandle,
             Self::WrongHandle { .. } => SinewStatus::WrongHandle,
@@ -25,7 +26,16 @@ impl Fault {
             Self::NoSuchName => SinewStatus::NoSuchName,
             Self::Open(error) => open_status(error),
             Self::Control(error) => control_status(error),
+            Self::Workspace(error) => workspace_status(error),
             Self::Frame(error) => frame_status(error),
+            Self::Hold(error) => hold_status(error),
+            Self::Output(error) => output_status(error),
+            Self::Map(error) => map_status(error),
+            Self::NoSuchInstance { .. } => SinewStatus::NoSuchInstance,
+            Self::NoSuchKnob { .. } => SinewStatus::NoSuchKnob,
+            Self::NoSuchPage { .. } => SinewStatus::NoSuchPage,
+            Self::BadReading { .. } | Self::BadAddress { .. } => SinewStatus::BadReading,
+            Self::TooMany { .. } => SinewStatus::TooMany,
             Self::Internal => SinewStatus::Internal,
         }
     }
@@ -48,8 +58,67 @@ fn frame_status(error: FrameError) -> SinewStatus {
         FrameError::NoSuchComponent { .. } => SinewStatus::NoSuchControl,
         FrameError::FeatureNotFinite { .. } => SinewStatus::NotFinite,
         FrameError::NotFinite { .. } => SinewStatus::FrameOverflow,
-        // Workspaces made through C are of the exact tier.
-        FrameError::NeedsExactTier => SinewStatus::Internal,
+        FrameError::NeedsExactTier => SinewStatus::NeedsExactTier,
+        _ => SinewStatus::Internal,
+    }
+}
+
+fn workspace_status(error: WorkspaceError) -> SinewStatus {
+    match error {
+        WorkspaceError::TooSmall { .. } => SinewStatus::TooShort,
+        WorkspaceError::NoFastTier => SinewStatus::NoFastTier,
+        // Kernels are detected, or scalar.
+        WorkspaceError::KernelsMissing { .. } => SinewStatus::Internal,
+        _ => SinewStatus::Internal,
+    }
+}
+
+fn hold_status(error: HandleError) -> SinewStatus {
+    match error {
+        HandleError::ForeignHandles => SinewStatus::ForeignHandles,
+        HandleError::ForeignWorkspace => SinewStatus::ForeignWorkspace,
+        HandleError::NeedsExactTier => SinewStatus::NeedsExactTier,
+        HandleError::ForeignControls => SinewStatus::ForeignControls,
+        HandleError::NoSuchVertex { .. } => SinewStatus::NoSuchVertex,
+        HandleError::NoSuchComponent { .. } => SinewStatus::NoSuchControl,
+        HandleError::AlreadyHeld { .. } => SinewStatus::AlreadyHeld,
+        HandleError::NotHeld { .. } => SinewStatus::NotHeld,
+        HandleError::Full { .. } => SinewStatus::HandlesFull,
+        HandleError::TargetNotFinite { .. } => SinewStatus::NotFinite,
+        HandleError::NotFinite { .. } => SinewStatus::HeldOverflow,
+        _ => SinewStatus::Internal,
+    }
+}
+
+fn output_status(error: OutputError) -> SinewStatus {
+    match error {
+        OutputError::Input(error) => frame_status(error),
+        OutputError::ScratchTooShort { .. } => SinewStatus::TooShort,
+        OutputError::NormalsMissing { .. } => SinewStatus::NoNormals,
+        OutputError::NoTexture { .. } => SinewStatus::NoTexture,
+        OutputError::StrideTooShort { .. } => SinewStatus::StrideTooShort,
+        OutputError::BufferTooShort { .. } => SinewStatus::TooShort,
+        OutputError::Overlap { .. } => SinewStatus::AttributesOverlap,
+        _ => SinewStatus::Internal,
+    }
+}
+
+fn map_status(error: MapError) -> SinewStatus {
+    match error {
+        MapError::SameAddress { .. } => SinewStatus::KnobTwice,
+        MapError::Calibration { .. } => SinewStatus::BadCalibration,
+        // Maps made through C smooth as usual.
+        MapError::Smoothing { .. } => SinewStatus::Internal,
+        MapError::Step { .. } => SinewStatus::BadStep,
+        MapError::NoSuchKnob { .. } => SinewStatus::NoSuchKnob,
+        MapError::NoSuchControl { .. } => SinewStatus::NoSuchControl,
+        MapError::Response { .. } => SinewStatus::BadResponse,
+        MapError::TwoHands { .. } => SinewStatus::TwoHands,
+        MapError::TreeKnobs => SinewStatus::BadTree,
+        MapError::TreeKnobBound { .. } => SinewStatus::BadTree,
+        MapError::TreeResponse { .. } => SinewStatus::BadResponse,
+        MapError::NoSuchPage { .. } => SinewStatus::NoSuchPage,
+        MapError::TooMany => SinewStatus::TooMany,
         _ => SinewStatus::Internal,
     }
 }
@@ -106,6 +175,10 @@ mod tests {
             ("formats/src/package/error.rs", "OpenError"),
             ("runtime/src/error.rs", "ControlError"),
             ("runtime/src/error.rs", "FrameError"),
+            ("runtime/src/error.rs", "WorkspaceError"),
+            ("runtime/src/handles/error.rs", "HandleError"),
+            ("runtime/src/output/error.rs", "OutputError"),
+            ("runtime/src/input/map.rs", "MapError"),
         ] {
             let source = fs::read_to_string(root.join(file)).expect("the source is there");
             let (_, body) = source
@@ -116,18 +189,18 @@ mod tests {
                 .lines()
                 .filter_map(|line| line.strip_prefix("    "))
                 .filter(|line| line.starts_with(char::is_uppercase))
-                .map(|line| line.trim_end_matches([' ', '{', ',']));
+                .map(|line| line.split([' ', '{', ',', '(']).next().unwrap_or_default());
             let mut count = 0;
             for variant in variants {
                 count += 1;
                 let arm = format!("{name}::{variant}");
                 let right = match name {
                     "OpenError" => format!("=> SinewStatus::Package{variant},"),
-                    _ => "=> SinewStatus::".to_owned(),
+                    _ => "=> ".to_owned(),
                 };
                 let has = |pattern: String| own.contains(&format!("{pattern} {right}"));
                 assert!(
-                    has(arm.clone()) || has(format!("{arm} {{ .. }}")),
+                    has(arm.clone()) || has(format!("{arm} {{ .. }}")) || has(format!("{arm}(error)")),
                     "{arm} has no status"
                 );
             }

@@ -1,7 +1,7 @@
 //! The controls handle: the K weights that a performer moves. Holds copies of the ranges, so that setting a weight needs
 //! neither basis nor package.
 
-use sinew_runtime::ControlError;
+use sinew_runtime::{Basis, ControlError, FrameError};
 
 use crate::basis::{SinewBasis, share_basis};
 use crate::details::SinewDetails;
@@ -17,7 +17,7 @@ pub struct SinewControls {
 }
 
 pub(crate) struct ControlsBody {
-    pub(crate) basis_id: [u8; 16],
+    basis_id: [u8; 16],
     /// Shape: `[K]`, finite.
     pub(crate) weights: &'static mut [f32],
     /// Lower and upper stops. Shape: `[K]`.
@@ -33,6 +33,15 @@ impl ControlsBody {
 
     fn layout(control_count: usize) -> SinewLayout {
         Handle::<Self>::layout(control_count * Self::BYTES_A_CONTROL)
+    }
+
+    /// Refuses a basis of other content.
+    pub(crate) fn check_basis(&self, basis: &Basis<'_>) -> Result<(), Fault> {
+        if self.basis_id == basis.id() {
+            Ok(())
+        } else {
+            Err(Fault::Frame(FrameError::ForeignControls))
+        }
     }
 
     /// Where a control stops.

@@ -1,12 +1,12 @@
 //! Details: the numbers and the sentence behind a status, in a struct of the caller's. No heap, no global state.
 
 use core::ffi::c_char;
-use core::fmt::{self, Write};
 
 use crate::fault::Fault;
 use crate::memory::Regions;
 use crate::status::SinewStatus;
 use crate::structs::{GrowingStruct, StructOut};
+use crate::text;
 
 /// Bytes of the text in `SinewDetails`, with the NUL.
 pub const SINEW_DETAILS_TEXT_BYTES: usize = 228;
@@ -57,52 +57,13 @@ impl DetailsOut {
             return;
         }
         let numbers = fault.numbers();
-        let mut text = Text {
-            bytes: [0; SINEW_DETAILS_TEXT_BYTES],
-            length: 0,
-        };
-        // An error says that the text was cut off, which is documented.
-        let _ = write!(text, "{fault}");
         self.0.write(&SinewDetails {
             struct_bytes: size_of::<SinewDetails>(),
             index: numbers.index,
             expected: numbers.expected,
             actual: numbers.actual,
             status: fault.status(),
-            text: text.bytes.map(|byte| byte as c_char),
+            text: text::of(fault),
         });
-    }
-}
-
-/// Text of bounded length that ends with NUL and never within a character.
-struct Text {
-    bytes: [u8; SINEW_DETAILS_TEXT_BYTES],
-    length: usize,
-}
-
-impl Write for Text {
-    fn write_str(&mut self, more: &str) -> fmt::Result {
-        let room = SINEW_DETAILS_TEXT_BYTES - 1 - self.length;
-        let taken = more.floor_char_boundary(room);
-        self.bytes[self.length..][..taken].copy_from_slice(&more.as_bytes()[..taken]);
-        self.length += taken;
-        if taken == more.len() { Ok(()) } else { Err(fmt::Error) }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn text_is_cut_between_characters_and_ends_with_nul() {
-        let mut text = Text {
-            bytes: [0; SINEW_DETAILS_TEXT_BYTES],
-            length: 0,
-        };
-        assert!(text.write_str(&"x".repeat(SINEW_DETAILS_TEXT_BYTES - 2)).is_ok());
-        assert!(text.write_str("é").is_err());
-        assert_eq!(text.length, SINEW_DETAILS_TEXT_BYTES - 2);
-        assert_eq!(text.bytes[text.length..], [0, 0]);
     }
 }

@@ -3,7 +3,8 @@
 
 use core::fmt;
 
-use sinew_runtime::{ControlError, FrameError, OpenError, WorkspaceError};
+use sinew_runtime::input::MapError;
+use sinew_runtime::{ControlError, FrameError, HandleError, OpenError, OutputError, WorkspaceError};
 
 use crate::handle::Kind;
 
@@ -35,9 +36,18 @@ pub(crate) enum Fault {
         expected: usize,
         actual: usize,
     },
+    ElementSize {
+        name: &'static str,
+        expected: usize,
+        actual: usize,
+    },
     UnknownOption {
         name: &'static str,
         at: usize,
+    },
+    UnknownChoice {
+        name: &'static str,
+        value: i32,
     },
     WrongAbi {
         expected: u32,
@@ -67,6 +77,33 @@ pub(crate) enum Fault {
     Control(ControlError),
     Workspace(WorkspaceError),
     Frame(FrameError),
+    Hold(HandleError),
+    Output(OutputError),
+    Map(MapError),
+    NoSuchInstance {
+        instance: usize,
+        instance_count: usize,
+    },
+    NoSuchKnob {
+        knob: usize,
+        knob_count: usize,
+    },
+    NoSuchPage {
+        page: usize,
+        page_count: usize,
+    },
+    BadReading {
+        value: i32,
+        full_scale: u32,
+    },
+    BadAddress {
+        address: u32,
+    },
+    TooMany {
+        name: &'static str,
+        limit: usize,
+        actual: usize,
+    },
     Internal,
 }
 
@@ -91,6 +128,24 @@ impl From<WorkspaceError> for Fault {
 impl From<FrameError> for Fault {
     fn from(error: FrameError) -> Self {
         Self::Frame(error)
+    }
+}
+
+impl From<HandleError> for Fault {
+    fn from(error: HandleError) -> Self {
+        Self::Hold(error)
+    }
+}
+
+impl From<OutputError> for Fault {
+    fn from(error: OutputError) -> Self {
+        Self::Output(error)
+    }
+}
+
+impl From<MapError> for Fault {
+    fn from(error: MapError) -> Self {
+        Self::Map(error)
     }
 }
 
@@ -130,9 +185,9 @@ impl Fault {
     pub(crate) fn numbers(&self) -> Numbers {
         match *self {
             Self::Misaligned { alignment, .. } => Numbers::counts(alignment, 0),
-            Self::TooShort { expected, actual, .. } | Self::StructSize { expected, actual, .. } => {
-                Numbers::counts(expected, actual)
-            }
+            Self::TooShort { expected, actual, .. }
+            | Self::StructSize { expected, actual, .. }
+            | Self::ElementSize { expected, actual, .. } => Numbers::counts(expected, actual),
             Self::TooLong { actual, .. } => Numbers::counts(isize::MAX as usize, actual),
             Self::UnknownOption { at, .. } => Numbers::index(at),
             Self::WrongAbi { expected, actual } => Numbers::counts(expected as usize, actual as usize),
@@ -155,8 +210,70 @@ impl Fault {
             Self::Frame(FrameError::FeatureNotFinite { vertex } | FrameError::NotFinite { vertex }) => {
                 Numbers::index(vertex)
             }
+            Self::Hold(error) => hold_numbers(error),
+            Self::Output(error) => output_numbers(error),
+            Self::Map(error) => map_numbers(error),
+            Self::NoSuchInstance {
+                instance,
+                instance_count,
+            } => Numbers::indexed(instance, instance_count, instance),
+            Self::NoSuchKnob { knob, knob_count } => Numbers::indexed(knob, knob_count, knob),
+            Self::NoSuchPage { page, page_count } => Numbers::indexed(page, page_count, page),
+            Self::BadAddress { address } => Numbers::counts(u16::MAX.into(), address as usize),
+            Self::TooMany { limit, actual, .. } => Numbers::counts(limit, actual),
+            Self::BadReading { value, full_scale } => Numbers::counts(full_scale as usize, value.max(0) as usize),
             _ => Numbers::default(),
         }
+    }
+}
+
+fn hold_numbers(error: HandleError) -> Numbers {
+    match error {
+        HandleError::NoSuchVertex { vertex, vertex_count } => Numbers::indexed(vertex, vertex_count, vertex),
+        HandleError::NoSuchComponent {
+            component,
+            component_count,
+        } => Numbers::indexed(component, component_count, component),
+        HandleError::AlreadyHeld { vertex }
+        | HandleError::NotHeld { vertex }
+        | HandleError::TargetNotFinite { vertex }
+        | HandleError::NotFinite { vertex } => Numbers::index(vertex),
+        HandleError::Full { capacity } => Numbers::counts(capacity, capacity),
+        _ => Numbers::default(),
+    }
+}
+
+fn output_numbers(error: OutputError) -> Numbers {
+    match error {
+        OutputError::ScratchTooShort { expected, actual } => Numbers::counts(expected, actual),
+        OutputError::StrideTooShort {
+            required_bytes,
+            stride_bytes,
+            ..
+        } => Numbers::counts(required_bytes, stride_bytes),
+        OutputError::BufferTooShort {
+            required_bytes,
+            actual_bytes,
+            ..
+        } => Numbers::counts(required_bytes, actual_bytes),
+        _ => Numbers::default(),
+    }
+}
+
+fn map_numbers(error: MapError) -> Numbers {
+    match error {
+        MapError::SameAddress { address } => Numbers::index(address.into()),
+        MapError::Calibration { knob } | MapError::Smoothing { knob } | MapError::Step { knob } => Numbers::index(knob),
+        MapError::NoSuchKnob { binding, knob } => Numbers::indexed(binding, 0, knob.into()),
+        MapError::NoSuchControl {
+            control,
+            component_count,
+        } => Numbers::indexed(control.into(), component_count, control.into()),
+        MapError::Response { binding, .. } | MapError::TreeKnobBound { binding } => Numbers::index(binding),
+        MapError::TwoHands { first, second } => Numbers::indexed(second, first, second),
+        MapError::TreeResponse { control, .. } => Numbers::index(control),
+        MapError::NoSuchPage { page } => Numbers::index(page.into()),
+        _ => Numbers::default(),
     }
 }
 
@@ -211,10 +328,15 @@ impl fmt::Display for Fault {
                 out,
                 "`{name}.struct_bytes` is {actual}; set it to sizeof, which is {expected} in this library"
             ),
+            Self::ElementSize { name, expected, actual } => write!(
+                out,
+                "an element of `{name}` is said to have {actual} bytes; pass sizeof, which is {expected} in this library"
+            ),
             Self::UnknownOption { name, at } => write!(
                 out,
                 "`{name}` asks at byte {at} for something that this library is too old for"
             ),
+            Self::UnknownChoice { name, value } => write!(out, "`{name}` is {value}, which this library does not know"),
             Self::WrongAbi { expected, actual } => write!(
                 out,
                 "the program was compiled with a header of interface version {actual}, the library has {expected}"
@@ -230,6 +352,27 @@ impl fmt::Display for Fault {
             Self::Control(error) => error.fmt(out),
             Self::Workspace(error) => error.fmt(out),
             Self::Frame(error) => error.fmt(out),
+            Self::Hold(error) => error.fmt(out),
+            Self::Output(error) => error.fmt(out),
+            Self::Map(error) => error.fmt(out),
+            Self::NoSuchInstance {
+                instance,
+                instance_count,
+            } => write!(out, "there is no instance {instance}: the batch has {instance_count}"),
+            Self::NoSuchKnob { knob, knob_count } => {
+                write!(out, "there is no knob {knob}: the surface has {knob_count}")
+            }
+            Self::NoSuchPage { page, page_count } => {
+                write!(out, "there is no page {page}: the bindings have {page_count}")
+            }
+            Self::BadAddress { address } => write!(out, "a knob has the address {address}; the largest is 65535"),
+            Self::TooMany { name, limit, actual } => write!(out, "`{name}` is {actual}; the most is {limit}"),
+            Self::BadReading { value, full_scale } => {
+                write!(
+                    out,
+                    "no knob reads {value} of {full_scale}, or the kind of reading is unknown"
+                )
+            }
             Self::Internal => write!(out, "the library has a defect; the handles it was writing are closed"),
         }
     }

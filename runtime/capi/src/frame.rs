@@ -1,9 +1,9 @@
 //! The frame: checks all memory of the call, then runs the runtime's own frame on it.
 
-use sinew_runtime::{Controls, Frame, FrameError, FrameOutcome};
+use sinew_runtime::{Basis, Controls, Frame, FrameOutcome};
 
 use crate::basis::{SinewBasis, share_basis};
-use crate::controls::{SinewControls, lend_controls};
+use crate::controls::{ControlsBody, SinewControls, lend_controls};
 use crate::details::SinewDetails;
 use crate::edge::edge_with_details;
 use crate::fault::Fault;
@@ -54,15 +54,20 @@ pub struct SinewFrameReport {
     pub struct_bytes: usize,
     /// What the frame had to do.
     pub outcome: SinewFrameOutcome,
+    /// Box around the positions, its least corner.
+    pub minimum: [f32; 3],
+    /// Its greatest corner.
+    pub maximum: [f32; 3],
 }
 
 // SAFETY: `repr(C)`, the size first. It is only written, never read.
 unsafe impl GrowingStruct for SinewFrameReport {
     const NAME: &'static str = "report";
-    const FIRST_BYTES: usize = size_of::<Self>();
+    // The first version ended behind `outcome` and its padding.
+    const FIRST_BYTES: usize = core::mem::offset_of!(Self, minimum).next_multiple_of(align_of::<Self>());
 }
 
-/// Plays one frame: the rest shape deformed by the controls.
+/// Plays one frame: the rest shape deformed by the controls, on the tier that the workspace was made for.
 ///
 /// `basis`, `workspace`, `controls`: made for the same content. Positions, normals, options, report, details, package and
 /// the memory of the handles must not overlap.
@@ -92,34 +97,61 @@ pub unsafe extern "C" fn sinew_frame(
 ) -> SinewStatus {
     let play = |regions: &mut Regions| {
         // SAFETY: the caller's promise for each of them.
-        let (basis, mut workspace, mut controls, report, options) = unsafe {
+        unsafe {
             let basis = share_basis(basis, regions)?;
-            let workspace: Lent<'_, WorkspaceBody> = Handle::lend(workspace.cast(), regions)?;
-            let controls = lend_controls(controls, regions)?;
             let report = StructOut::optional(report, regions)?;
-            (basis, workspace, controls, report, structs::read(options, regions)?)
-        };
-        let basis = &basis.basis;
-        if controls.basis_id != basis.id() {
-            return Err(Fault::Frame(FrameError::ForeignControls));
-        }
-        let vertex_count = basis.vertex_count();
-        // SAFETY: the caller's promise.
-        let (positions, normals) = unsafe {
-            let room = options.position_floats;
-            let positions = vectors(options.positions, room, vertex_count, "positions", regions)?;
-            let normals = match options.normals.is_null() {
-                true => None,
-                false => Some(vectors(
-                    options.normals,
-                    options.normal_floats,
-                    vertex_count,
-                    "normals",
-                    regions,
-                )?),
+            let options = structs::read(options, regions)?;
+            let target = Target {
+                workspace,
+                controls,
+                positions: options.positions,
+                position_floats: options.position_floats,
+                normals: options.normals,
+                normal_floats: options.normal_floats,
             };
-            (positions, normals)
+            report.write(&target.play(&basis.basis, regions)?);
+        }
+        Ok(())
+    };
+    // SAFETY: the caller's promise.
+    unsafe { edge_with_details(details, play) }
+}
+
+/// Where one frame happens: the handles it uses and the outputs it writes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Target {
+    pub(crate) workspace: *mut SinewWorkspace,
+    pub(crate) controls: *const SinewControls,
+    pub(crate) positions: *mut f32,
+    pub(crate) position_floats: usize,
+    pub(crate) normals: *mut f32,
+    pub(crate) normal_floats: usize,
+}
+
+impl Target {
+    /// Nothing to use and nothing to write: refused.
+    pub(crate) const NOWHERE: Self = Self {
+        workspace: core::ptr::null_mut(),
+        controls: core::ptr::null(),
+        positions: core::ptr::null_mut(),
+        position_floats: 0,
+        normals: core::ptr::null_mut(),
+        normal_floats: 0,
+    };
+
+    /// Checks all of it and plays. The caller has added the basis to the regions.
+    ///
+    /// # Safety
+    /// The handles are null or handles of their kind; the outputs are null or writable for their floats.
+    pub(crate) unsafe fn play(&self, basis: &Basis<'static>, regions: &mut Regions) -> Result<SinewFrameReport, Fault> {
+        // SAFETY: the caller's promise, both.
+        let (mut workspace, mut controls) = unsafe {
+            let workspace: Lent<'_, WorkspaceBody> = Handle::lend(self.workspace.cast(), regions)?;
+            (workspace, lend_controls(self.controls, regions)?)
         };
+        controls.check_basis(basis)?;
+        // SAFETY: the caller's promise.
+        let (positions, normals) = unsafe { self.outputs(basis.vertex_count(), regions)? };
         let controls = Controls::resume(basis, &mut *controls.weights)?;
         let job = Frame {
             basis,
@@ -131,14 +163,53 @@ pub unsafe extern "C" fn sinew_frame(
             FrameOutcome::Solved => SinewFrameOutcome::Solved,
             FrameOutcome::Unchanged => SinewFrameOutcome::Unchanged,
         };
-        report.write(&SinewFrameReport {
+        let bounds = workspace.workspace.bounds();
+        Ok(SinewFrameReport {
             struct_bytes: size_of::<SinewFrameReport>(),
             outcome,
-        });
+            minimum: bounds.minimum,
+            maximum: bounds.maximum,
+        })
+    }
+
+    /// # Safety
+    /// As for `play`.
+    #[expect(clippy::type_complexity, reason = "two outputs, one of them optional")]
+    unsafe fn outputs<'b>(
+        &self,
+        vertex_count: usize,
+        regions: &mut Regions,
+    ) -> Result<(&'b mut [[f32; 3]], Option<&'b mut [[f32; 3]]>), Fault> {
+        // SAFETY: the caller's promise, both.
+        unsafe {
+            let positions = vectors(self.positions, self.position_floats, vertex_count, "positions", regions)?;
+            let normals = match self.normals.is_null() {
+                true => None,
+                false => Some(vectors(
+                    self.normals,
+                    self.normal_floats,
+                    vertex_count,
+                    "normals",
+                    regions,
+                )?),
+            };
+            Ok((positions, normals))
+        }
+    }
+
+    /// Adds everything to the regions without using it.
+    ///
+    /// # Safety
+    /// As for `play`.
+    pub(crate) unsafe fn check(&self, vertex_count: usize, regions: &mut Regions) -> Result<(), Fault> {
+        // SAFETY: the caller's promise, all.
+        unsafe {
+            regions.add(Handle::<WorkspaceBody>::place(self.workspace.cast(), Access::Write)?)?;
+            regions.add(Handle::<ControlsBody>::place(self.controls.cast(), Access::Write)?)?;
+            self.outputs(vertex_count, regions)?;
+        }
         Ok(())
-    };
-    // SAFETY: the caller's promise.
-    unsafe { edge_with_details(details, play) }
+    }
 }
 
 /// A caller's output of one vector a vertex.

@@ -10,12 +10,16 @@ use crate::fault::Fault;
 use crate::memory::{Access, Region, Regions, SinewLayout, present};
 
 /// Start of a handle and of the buffers behind it: a cache line, and the widest vector register.
-const ALIGNMENT: usize = 64;
+pub(crate) const ALIGNMENT: usize = 64;
 const CANARY_BYTES: usize = size_of::<u64>();
 
 const BASIS: u32 = u32::from_le_bytes(*b"SnwB");
 const WORKSPACE: u32 = u32::from_le_bytes(*b"SnwW");
 const CONTROLS: u32 = u32::from_le_bytes(*b"SnwC");
+const DECODER: u32 = u32::from_le_bytes(*b"SnwD");
+const SURFACE: u32 = u32::from_le_bytes(*b"SnwS");
+const HANDLES: u32 = u32::from_le_bytes(*b"SnwH");
+const BATCH: u32 = u32::from_le_bytes(*b"SnwN");
 const CLOSED: u32 = u32::from_le_bytes(*b"Snw0");
 
 /// Which handle.
@@ -24,14 +28,32 @@ pub(crate) enum Kind {
     Basis,
     Workspace,
     Controls,
+    Decoder,
+    Surface,
+    Handles,
+    Batch,
 }
 
 impl Kind {
+    const ALL: [Self; 7] = [
+        Self::Basis,
+        Self::Workspace,
+        Self::Controls,
+        Self::Decoder,
+        Self::Surface,
+        Self::Handles,
+        Self::Batch,
+    ];
+
     const fn tag(self) -> u32 {
         match self {
             Self::Basis => BASIS,
             Self::Workspace => WORKSPACE,
             Self::Controls => CONTROLS,
+            Self::Decoder => DECODER,
+            Self::Surface => SURFACE,
+            Self::Handles => HANDLES,
+            Self::Batch => BATCH,
         }
     }
 
@@ -40,13 +62,15 @@ impl Kind {
             Self::Basis => "basis",
             Self::Workspace => "workspace",
             Self::Controls => "controls",
+            Self::Decoder => "decoder",
+            Self::Surface => "surface",
+            Self::Handles => "handles",
+            Self::Batch => "batch",
         }
     }
 
     fn of(tag: u32) -> Option<Self> {
-        [Self::Basis, Self::Workspace, Self::Controls]
-            .into_iter()
-            .find(|kind| kind.tag() == tag)
+        Self::ALL.into_iter().find(|kind| kind.tag() == tag)
     }
 }
 
@@ -162,6 +186,15 @@ impl<B: Body> Handle<B> {
         }
         // SAFETY: `create` wrote a whole handle of this kind here, and it stands.
         Ok(unsafe { &*pointer })
+    }
+
+    /// Where a handle lies that is not used now, but must not be written by anybody else.
+    ///
+    /// # Safety
+    /// As for `check`.
+    pub(crate) unsafe fn place(pointer: *const Self, access: Access) -> Result<Region, Fault> {
+        // SAFETY: the caller's promise.
+        unsafe { Self::check(pointer)? }.region(access)
     }
 
     fn region(&self, access: Access) -> Result<Region, Fault> {

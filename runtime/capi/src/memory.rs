@@ -57,14 +57,16 @@ impl Region {
 }
 
 /// All regions of one call.
+#[derive(Clone, Copy)]
 pub(crate) struct Regions {
     regions: [Region; Self::COUNT_MAX],
     count: usize,
 }
 
 impl Regions {
-    /// No call has more: a frame's details, options, report, basis, package, workspace, controls, positions, normals.
-    const COUNT_MAX: usize = 9;
+    /// No call has more: a batch's details, result, basis, package, instances and memory, and of each instance workspace,
+    /// controls, positions and normals.
+    const COUNT_MAX: usize = 10;
 
     pub(crate) fn new() -> Self {
         Self {

@@ -1,6 +1,8 @@
-//! Status codes: one for every fault, with a name and a sentence. The codes of released versions keep their meaning.
+//! Status codes: one for every fault. The codes of released versions keep their meaning.
 
 use core::ffi::{CStr, c_char};
+
+use crate::status_texts::TABLE;
 
 /// What a call returns. Unless a status says otherwise, a call that returns anything but `SINEW_STATUS_OK` has changed
 /// nothing. New codes may be added: treat an unknown one as a fault.
@@ -49,6 +51,52 @@ pub enum SinewStatus {
     NotFinite = 22,
     /// The weights are so large that a position left f32. The outputs hold the rest shape, the workspace is at rest.
     FrameOverflow = 23,
+    /// The package has no fast tier; `sinew bake` makes one.
+    NoFastTier = 24,
+    /// The workspace is of the fast tier, and the call needs one of the exact tier.
+    NeedsExactTier = 25,
+    /// The handles were made for other content than the basis has now.
+    ForeignHandles = 26,
+    /// The index of a vertex is not less than their count.
+    NoSuchVertex = 27,
+    /// The vertex is held already; give it a new target.
+    AlreadyHeld = 28,
+    /// The vertex is not held.
+    NotHeld = 29,
+    /// As many vertices are held as there is room for.
+    HandlesFull = 30,
+    /// The weights are so large that a held vertex left f32; the controls stay as they were.
+    HeldOverflow = 31,
+    /// Normals or tangents are to be written, and no normals were given.
+    NoNormals = 32,
+    /// Tangents or texture coordinates are to be written, and the package has no texture coordinates.
+    NoTexture = 33,
+    /// The stride of an attribute is less than its size.
+    StrideTooShort = 34,
+    /// Two attributes of a vertex would write into each other, or interleave with different strides.
+    AttributesOverlap = 35,
+    /// The index of an instance is not less than their count.
+    NoSuchInstance = 36,
+    /// The index of a knob is not less than their count.
+    NoSuchKnob = 40,
+    /// No binding is on this page.
+    NoSuchPage = 41,
+    /// No knob says this: an unknown kind of reading, a value above its full scale, a number that does not fit.
+    BadReading = 42,
+    /// Two knobs have one address.
+    KnobTwice = 43,
+    /// A knob's calibration leaves no range to turn in.
+    BadCalibration = 44,
+    /// A knob's step is not above 0 and at most 1.
+    BadStep = 45,
+    /// Two bindings move one control on the same page.
+    TwoHands = 46,
+    /// The tree has no coarse knob, more knobs than there are, or one that a binding has too.
+    BadTree = 47,
+    /// A number of a response is out of range, or its limits do not fit the control.
+    BadResponse = 48,
+    /// More knobs or bindings than a surface takes.
+    TooMany = 49,
     /// A defect of the library, stopped at its edge; the handles that the call was writing are closed, its outputs may be half
     /// written. Please report it.
     Internal = 99,
@@ -118,278 +166,13 @@ pub enum SinewStatus {
     PackageRenderFaceDiffers = 131,
 }
 
-/// Status, its name in the header, its text.
-const TABLE: [(SinewStatus, &CStr, &CStr); 54] = [
-    (SinewStatus::Ok, c"SINEW_STATUS_OK", c"done"),
-    (
-        SinewStatus::NullPointer,
-        c"SINEW_STATUS_NULL_POINTER",
-        c"a pointer that must not be NULL is",
-    ),
-    (
-        SinewStatus::Misaligned,
-        c"SINEW_STATUS_MISALIGNED",
-        c"a pointer does not start at a multiple of the alignment it needs",
-    ),
-    (
-        SinewStatus::TooShort,
-        c"SINEW_STATUS_TOO_SHORT",
-        c"memory or a buffer is shorter than it must be",
-    ),
-    (
-        SinewStatus::TooLong,
-        c"SINEW_STATUS_TOO_LONG",
-        c"a length reaches beyond the address space",
-    ),
-    (
-        SinewStatus::Overlap,
-        c"SINEW_STATUS_OVERLAP",
-        c"memory that the call writes overlaps other memory that it uses",
-    ),
-    (
-        SinewStatus::StructSize,
-        c"SINEW_STATUS_STRUCT_SIZE",
-        c"a struct's first member is not its size; set it to sizeof",
-    ),
-    (
-        SinewStatus::UnknownOption,
-        c"SINEW_STATUS_UNKNOWN_OPTION",
-        c"a struct asks for something that this library is too old for",
-    ),
-    (
-        SinewStatus::WrongAbi,
-        c"SINEW_STATUS_WRONG_ABI",
-        c"header and library have different interface versions",
-    ),
-    (
-        SinewStatus::NotAHandle,
-        c"SINEW_STATUS_NOT_A_HANDLE",
-        c"not a handle, or its memory was freed or written over",
-    ),
-    (
-        SinewStatus::WrongHandle,
-        c"SINEW_STATUS_WRONG_HANDLE",
-        c"a handle of another kind",
-    ),
-    (
-        SinewStatus::ClosedHandle,
-        c"SINEW_STATUS_CLOSED_HANDLE",
-        c"the handle is closed",
-    ),
-    (
-        SinewStatus::MovedHandle,
-        c"SINEW_STATUS_MOVED_HANDLE",
-        c"the handle was copied or moved; make it anew where it shall stay",
-    ),
-    (
-        SinewStatus::DamagedHandle,
-        c"SINEW_STATUS_DAMAGED_HANDLE",
-        c"something wrote over the handle's memory",
-    ),
-    (
-        SinewStatus::InUse,
-        c"SINEW_STATUS_IN_USE",
-        c"another thread is using the handle at this moment",
-    ),
-    (
-        SinewStatus::ForeignWorkspace,
-        c"SINEW_STATUS_FOREIGN_WORKSPACE",
-        c"the workspace was made for another basis; make one for this basis",
-    ),
-    (
-        SinewStatus::ForeignControls,
-        c"SINEW_STATUS_FOREIGN_CONTROLS",
-        c"the controls were made for another basis; make some for this basis",
-    ),
-    (
-        SinewStatus::NoSuchControl,
-        c"SINEW_STATUS_NO_SUCH_CONTROL",
-        c"there is no control of this index",
-    ),
-    (
-        SinewStatus::NoSuchName,
-        c"SINEW_STATUS_NO_SUCH_NAME",
-        c"there is no control of this name",
-    ),
-    (
-        SinewStatus::NotFinite,
-        c"SINEW_STATUS_NOT_FINITE",
-        c"a weight is NaN or infinite; the weights stay as they were",
-    ),
-    (
-        SinewStatus::FrameOverflow,
-        c"SINEW_STATUS_FRAME_OVERFLOW",
-        c"the weights are so large that a position left the range of numbers; the mesh is at rest",
-    ),
-    (
-        SinewStatus::Internal,
-        c"SINEW_STATUS_INTERNAL",
-        c"a defect of the library; the handles that the call was writing are closed",
-    ),
-    (
-        SinewStatus::PackageTooShort,
-        c"SINEW_STATUS_PACKAGE_TOO_SHORT",
-        c"not a package: fewer bytes than a header",
-    ),
-    (
-        SinewStatus::PackageWrongMagic,
-        c"SINEW_STATUS_PACKAGE_WRONG_MAGIC",
-        c"not a package, or one that went through a transfer in text mode",
-    ),
-    (
-        SinewStatus::PackageHeaderCorrupt,
-        c"SINEW_STATUS_PACKAGE_HEADER_CORRUPT",
-        c"the package's header is damaged; copy the file again",
-    ),
-    (
-        SinewStatus::PackageUnsupportedVersion,
-        c"SINEW_STATUS_PACKAGE_UNSUPPORTED_VERSION",
-        c"the package has a format version that this library does not read",
-    ),
-    (
-        SinewStatus::PackageReservedNotZero,
-        c"SINEW_STATUS_PACKAGE_RESERVED_NOT_ZERO",
-        c"reserved bytes of the package's header are in use",
-    ),
-    (
-        SinewStatus::PackageUnknownKind,
-        c"SINEW_STATUS_PACKAGE_UNKNOWN_KIND",
-        c"the package is of an unknown kind",
-    ),
-    (
-        SinewStatus::PackageWrongKind,
-        c"SINEW_STATUS_PACKAGE_WRONG_KIND",
-        c"the package is not a baked one; run `sinew bake` on it",
-    ),
-    (
-        SinewStatus::PackageTruncated,
-        c"SINEW_STATUS_PACKAGE_TRUNCATED",
-        c"the package is cut off; copy the file again",
-    ),
-    (
-        SinewStatus::PackageTrailingBytes,
-        c"SINEW_STATUS_PACKAGE_TRAILING_BYTES",
-        c"bytes follow the package; pass its exact length",
-    ),
-    (
-        SinewStatus::PackageMisaligned,
-        c"SINEW_STATUS_PACKAGE_MISALIGNED",
-        c"the package must start at a multiple of 16 bytes in memory",
-    ),
-    (
-        SinewStatus::PackagePayloadCorrupt,
-        c"SINEW_STATUS_PACKAGE_PAYLOAD_CORRUPT",
-        c"the package is damaged; copy the file again",
-    ),
-    (
-        SinewStatus::PackageContentIdMismatch,
-        c"SINEW_STATUS_PACKAGE_CONTENT_ID_MISMATCH",
-        c"the package's content id is not that of its content",
-    ),
-    (
-        SinewStatus::PackageMalformed,
-        c"SINEW_STATUS_PACKAGE_MALFORMED",
-        c"the package's payload is not a valid archive",
-    ),
-    (
-        SinewStatus::PackageNotFinite,
-        c"SINEW_STATUS_PACKAGE_NOT_FINITE",
-        c"a number of the package is NaN or infinite",
-    ),
-    (
-        SinewStatus::PackageOutOfRange,
-        c"SINEW_STATUS_PACKAGE_OUT_OF_RANGE",
-        c"a number of the package lies outside its range",
-    ),
-    (
-        SinewStatus::PackageNotPositive,
-        c"SINEW_STATUS_PACKAGE_NOT_POSITIVE",
-        c"a number of the package must be above zero and is not",
-    ),
-    (
-        SinewStatus::PackagePivotNotPositive,
-        c"SINEW_STATUS_PACKAGE_PIVOT_NOT_POSITIVE",
-        c"a pivot of the package's factor is not above zero",
-    ),
-    (
-        SinewStatus::PackageIndexOutOfRange,
-        c"SINEW_STATUS_PACKAGE_INDEX_OUT_OF_RANGE",
-        c"an index of the package points past the end",
-    ),
-    (
-        SinewStatus::PackageCountMismatch,
-        c"SINEW_STATUS_PACKAGE_COUNT_MISMATCH",
-        c"two counts of the package must agree and do not",
-    ),
-    (
-        SinewStatus::PackageTooFew,
-        c"SINEW_STATUS_PACKAGE_TOO_FEW",
-        c"a field of the package has too few elements",
-    ),
-    (
-        SinewStatus::PackageTooMany,
-        c"SINEW_STATUS_PACKAGE_TOO_MANY",
-        c"a field of the package has more elements than the format allows",
-    ),
-    (
-        SinewStatus::PackageNotAscending,
-        c"SINEW_STATUS_PACKAGE_NOT_ASCENDING",
-        c"elements of the package must ascend and do not",
-    ),
-    (
-        SinewStatus::PackageParentAfterChild,
-        c"SINEW_STATUS_PACKAGE_PARENT_AFTER_CHILD",
-        c"a block's parent is missing or comes after it",
-    ),
-    (
-        SinewStatus::PackageNotContiguous,
-        c"SINEW_STATUS_PACKAGE_NOT_CONTIGUOUS",
-        c"parts of the package must follow one another and do not",
-    ),
-    (
-        SinewStatus::PackageNotAPermutation,
-        c"SINEW_STATUS_PACKAGE_NOT_A_PERMUTATION",
-        c"the package's vertex orders are not each other's inverse",
-    ),
-    (
-        SinewStatus::PackageNotSymmetric,
-        c"SINEW_STATUS_PACKAGE_NOT_SYMMETRIC",
-        c"an edge of the package differs in its two directions",
-    ),
-    (
-        SinewStatus::PackageBitmapTail,
-        c"SINEW_STATUS_PACKAGE_BITMAP_TAIL",
-        c"a bit beyond the package's last vertex is set",
-    ),
-    (
-        SinewStatus::PackageRangeWithoutZero,
-        c"SINEW_STATUS_PACKAGE_RANGE_WITHOUT_ZERO",
-        c"the range of a control leaves out zero",
-    ),
-    (
-        SinewStatus::PackageNameInvalid,
-        c"SINEW_STATUS_PACKAGE_NAME_INVALID",
-        c"a name in the package is empty, too long or has control characters",
-    ),
-    (
-        SinewStatus::PackageNameDuplicate,
-        c"SINEW_STATUS_PACKAGE_NAME_DUPLICATE",
-        c"two controls of the package have the same name",
-    ),
-    (
-        SinewStatus::PackageSkinWeightSum,
-        c"SINEW_STATUS_PACKAGE_SKIN_WEIGHT_SUM",
-        c"package: skin weights of the fast tier do not sum to one",
-    ),
-    (
-        SinewStatus::PackageRenderFaceDiffers,
-        c"SINEW_STATUS_PACKAGE_RENDER_FACE_DIFFERS",
-        c"package: a triangle of render vertices does not stand for its triangle",
-    ),
-];
-
 fn entry(status: i32) -> Option<&'static (SinewStatus, &'static CStr, &'static CStr)> {
     TABLE.iter().find(|(known, ..)| *known as i32 == status)
+}
+
+/// The status of a number that was one.
+pub(crate) fn known(status: i32) -> SinewStatus {
+    entry(status).map_or(SinewStatus::Internal, |(status, ..)| *status)
 }
 
 /// What a status means, in one English sentence without a full stop. Never NULL, never freed, unknown codes included.

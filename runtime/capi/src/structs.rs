@@ -107,3 +107,84 @@ impl<T: GrowingStruct> StructOut<T> {
         }
     }
 }
+
+/// An array's element whose size the caller gives beside the array, for the same growth.
+///
+/// # Safety
+/// `repr(C)`, no drop, and valid for any bits.
+pub(crate) unsafe trait GrowingElement: Copy {
+    const NAME: &'static str;
+    /// Size in the first version that had this struct.
+    const FIRST_BYTES: usize;
+}
+
+/// An array of such elements, checked.
+pub(crate) struct Elements<T> {
+    start: *const T,
+    count: usize,
+    stride_bytes: usize,
+}
+
+impl<T: GrowingElement> Elements<T> {
+    /// No elements may be no pointer.
+    ///
+    /// # Safety
+    /// `start` is null or readable for `count` elements of `stride_bytes`, as long as this is used.
+    pub(crate) unsafe fn new(
+        start: *const T,
+        count: usize,
+        stride_bytes: usize,
+        regions: &mut Regions,
+    ) -> Result<Self, Fault> {
+        if count > 0 {
+            present(start, T::NAME)?;
+            if !(T::FIRST_BYTES..=STRUCT_BYTES_MAX).contains(&stride_bytes)
+                || !stride_bytes.is_multiple_of(align_of::<T>())
+            {
+                return Err(Fault::ElementSize {
+                    name: T::NAME,
+                    expected: size_of::<T>(),
+                    actual: stride_bytes,
+                });
+            }
+            let bytes = count.saturating_mul(stride_bytes);
+            regions.add(Region::new(start, bytes, T::NAME, Access::Read)?)?;
+        }
+        Ok(Self {
+            start,
+            count,
+            stride_bytes,
+        })
+    }
+
+    pub(crate) fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Reads an element; members that the caller's version lacks are zero. None behind the last.
+    pub(crate) fn get(&self, index: usize) -> Option<Result<T, Fault>> {
+        if index >= self.count {
+            return None;
+        }
+        let element = self.start.cast::<u8>().wrapping_add(index * self.stride_bytes);
+        let known = self.stride_bytes.min(size_of::<T>());
+        for at in known..self.stride_bytes {
+            // SAFETY: within the element, which `new` was promised to be readable.
+            if unsafe { element.add(at).read() } != 0 {
+                return Some(Err(Fault::UnknownOption { name: T::NAME, at }));
+            }
+        }
+        let mut value = MaybeUninit::<T>::zeroed();
+        // SAFETY: both sides are at least `known` bytes; every bit pattern is a value.
+        unsafe {
+            element.copy_to_nonoverlapping(value.as_mut_ptr().cast(), known);
+            Some(Ok(value.assume_init()))
+        }
+    }
+}
+
+/// The choice of a number that a struct or an argument gives: 0 is the first.
+pub(crate) fn choice<T: Copy>(name: &'static str, value: i32, choices: &[T]) -> Result<T, Fault> {
+    let chosen = usize::try_from(value).ok().and_then(|index| choices.get(index));
+    chosen.copied().ok_or(Fault::UnknownChoice { name, value })
+}

@@ -2,6 +2,8 @@
 
 use core::ffi::{CStr, c_char};
 
+use crate::fault::Fault;
+
 /// Version of this interface. Rises when a function, a struct or a status code changes its meaning; additions leave it.
 pub const SINEW_ABI_VERSION: u32 = 1;
 
@@ -18,11 +20,23 @@ pub extern "C" fn sinew_version() -> *const c_char {
     VERSION.as_ptr()
 }
 
-/// The interface version that the library was built with; `SINEW_ABI_VERSION` is that of the header. `sinew_basis_open`
-/// compares the two.
+/// The interface version that the library was built with; `SINEW_ABI_VERSION` is that of the header. The functions that open
+/// something compare the two.
 ///
 /// Threads: any.
 #[unsafe(no_mangle)]
 pub extern "C" fn sinew_abi_version() -> u32 {
     SINEW_ABI_VERSION
+}
+
+/// Refuses a program that was compiled with another header.
+pub(crate) fn check_abi(abi_version: u32) -> Result<(), Fault> {
+    if abi_version == SINEW_ABI_VERSION {
+        Ok(())
+    } else {
+        Err(Fault::WrongAbi {
+            expected: SINEW_ABI_VERSION,
+            actual: abi_version,
+        })
+    }
 }

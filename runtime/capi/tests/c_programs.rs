@@ -8,6 +8,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use common::{Output, compact_package, compile, crate_folder, libraries, other_package, package, run, tool};
+use sinew_runtime::input::{
+    ControlMap, ControlSurface, Decoder, Knob, KnobState, Settings, SlotState, SurfaceSettings, TreePages,
+};
 use sinew_runtime::{Basis, Controls, Frame, Workspace, WorkspaceLayout};
 use tempfile::TempDir;
 
@@ -148,16 +151,92 @@ fn the_example_plays_the_runtime_s_pose_linked_dynamically() {
     check_example(&libraries().shared);
 }
 
+/// Lines of a box of four knobs: one is turned up and part of the way back, the others stand; a print among them.
+fn knob_lines() -> String {
+    let mut lines = String::from("hello, I am a box\r\n");
+    for step in 0..200_u32 {
+        let turned = (17 * step).min(1023) - 5 * step.saturating_sub(100).min(60);
+        lines += &format!("{turned}|100|0|1023\r\n");
+    }
+    lines
+}
+
+/// What the runtime makes of bytes that come 64 a frame, sixty frames a second: positions, and the weights.
+fn expected_play(bytes: &[u8]) -> (Vec<[f32; 3]>, Vec<f32>) {
+    let package = package();
+    let basis = Basis::open(&package).expect("valid");
+    let knobs: [Knob<'_>; 4] = core::array::from_fn(|n| Knob::new(n as u16, ""));
+    let (coarse_knobs, fine_knobs) = TreePages::share(&basis, 4);
+    let tree = TreePages {
+        coarse_knobs,
+        fine_knobs,
+        ..TreePages::default()
+    };
+    let map = ControlMap::new(basis, &knobs, &[], &[], Some(tree)).expect("a map");
+    let (mut states, mut slots) = ([KnobState::default(); 4], [SlotState::default(); 4]);
+    let mut surface = ControlSurface::new(map, SurfaceSettings::default(), &mut states, &mut slots).expect("room");
+    let mut decoder = Decoder::new(None, Settings::default());
+    let mut weights = vec![0.0; basis.component_count()];
+    let mut controls = Controls::new(&basis, &mut weights).expect("one weight a component");
+    let mut now_us = 0;
+    for piece in bytes.chunks(64).chain([&[][..]]) {
+        decoder.feed(piece, &mut |event| surface.event(now_us, event));
+        surface.advance(now_us, &mut controls).expect("its own controls");
+        now_us += 16_667;
+    }
+    let mut memory = vec![0; WorkspaceLayout::for_basis(&basis).unaligned_bytes()];
+    let mut workspace = Workspace::new(&basis, &mut memory).expect("enough");
+    let mut positions = vec![[0.0; 3]; basis.vertex_count()];
+    let job = Frame {
+        basis: &basis,
+        controls: &controls,
+        positions: &mut positions,
+        normals: None,
+    };
+    job.run(&mut workspace).expect("finite");
+    (positions, weights)
+}
+
 #[test]
-fn every_misuse_is_refused_by_name_and_changes_nothing() {
+fn the_knob_example_plays_what_the_box_says() {
     let folder = Folder::new();
-    let program = folder.program("tests/misuse.c", &libraries().archive);
+    let (bytes, obj) = (folder.file("bytes"), folder.file("knobs.obj"));
+    let lines = knob_lines();
+    fs::write(&bytes, &lines).expect("written");
+    let program = folder.program("examples/knobs.c", &libraries().archive);
+    let output = run_twice(&program, &[folder.file("baked.sinew"), bytes, obj.clone(), "4".into()]);
+    assert_eq!(output.code, Some(0), "{}", output.stderr);
+    let (positions, weights) = expected_play(lines.as_bytes());
+    assert!(weights[0] > 0.1, "{weights:?}");
+    let written = fs::read_to_string(&obj).expect("the example wrote it");
+    assert_eq!(
+        vectors(&written, "v"),
+        positions,
+        "the runtime's own positions, to the bit"
+    );
+    let mut said = output.stdout.lines();
+    let device = said.next().expect("a line on the device");
+    assert!(device.starts_with("text lines, "), "{device}");
+    assert!(device.contains(&format!("; {} bytes, ", lines.len())), "{device}");
+    let knobs: Vec<&str> = said.collect();
+    assert_eq!(knobs.len(), 4, "{knobs:?}");
+    assert_eq!(knobs[0], "knob 0  moves c00");
+    assert_eq!(knobs[1], "knob 1  moves c00.f0, turn right 40 % to pick up");
+    assert_eq!(knobs[2], "knob 2  moves nothing", "c00 has one child");
+}
+
+/// Programs of wrong uses, each with its expected lines beside it.
+const MISUSES: [&str; 3] = ["misuse", "misuse_frames", "misuse_knobs"];
+
+fn check_misuse(name: &str) {
+    let folder = Folder::new();
+    let program = folder.program(&format!("tests/{name}.c"), &libraries().archive);
     let packages = ["baked.sinew", "other.sinew", "compact.sinew"].map(|name| folder.file(name));
     let output = run_twice(&program, &packages);
-    let expected_file = crate_folder().join("tests/misuse.txt");
+    let expected_file = crate_folder().join(format!("tests/{name}.txt"));
     if std::env::var_os("UPDATE_MISUSE").is_some() {
         fs::write(&expected_file, &output.stdout).expect("written");
-        panic!("misuse.txt was written; read the changes, then run the test again without UPDATE_MISUSE");
+        panic!("{name}.txt was written; read the changes, then run the test again without UPDATE_MISUSE");
     }
     let expected = fs::read_to_string(&expected_file).expect("the expected lines are there");
     for (number, (line, expected)) in output.stdout.lines().zip(expected.lines()).enumerate() {
@@ -167,12 +246,29 @@ fn every_misuse_is_refused_by_name_and_changes_nothing() {
     assert_eq!(output.code, Some(0), "{}", output.stderr);
 }
 
+#[test]
+fn every_misuse_of_packages_and_frames_is_refused_by_name_and_changes_nothing() {
+    check_misuse("misuse");
+}
+
+#[test]
+fn every_misuse_of_tiers_buffers_handles_and_batches_is_refused_by_name_and_changes_nothing() {
+    check_misuse("misuse_frames");
+}
+
+#[test]
+fn every_misuse_of_decoders_and_surfaces_is_refused_by_name_and_changes_nothing() {
+    check_misuse("misuse_knobs");
+}
+
 /// What no single-threaded C program can bring about, or only with a resealed package.
 const NOT_IN_MISUSE: [&str; 2] = ["SINEW_STATUS_IN_USE", "SINEW_STATUS_INTERNAL"];
 
 #[test]
 fn the_misuses_show_every_status_that_is_not_of_a_package() {
-    let shown = fs::read_to_string(crate_folder().join("tests/misuse.txt")).expect("the expected lines are there");
+    let shown = MISUSES.map(|name| {
+        fs::read_to_string(crate_folder().join(format!("tests/{name}.txt"))).expect("the expected lines are there")
+    });
     let header = fs::read_to_string(crate_folder().join("include/sinew.h")).expect("the header is there");
     let statuses = header
         .lines()
@@ -183,9 +279,12 @@ fn the_misuses_show_every_status_that_is_not_of_a_package() {
     for status in statuses.filter(|name| !NOT_IN_MISUSE.contains(name)) {
         count += 1;
         assert!(
-            shown.lines().any(|line| line.ends_with(status)),
+            shown
+                .iter()
+                .flat_map(|text| text.lines())
+                .any(|line| line.ends_with(status)),
             "{status} is not shown"
         );
     }
-    assert!(count > 15);
+    assert!(count > 40);
 }

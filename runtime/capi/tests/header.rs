@@ -11,7 +11,7 @@ use std::process::Command;
 use common::{compile, crate_folder, header_functions, libraries, run, tool};
 
 /// The order in which the manual is read.
-const SOURCES: [&str; 8] = [
+const SOURCES: [&str; 16] = [
     "version.rs",
     "status.rs",
     "details.rs",
@@ -20,6 +20,14 @@ const SOURCES: [&str; 8] = [
     "workspace.rs",
     "controls.rs",
     "frame.rs",
+    "output.rs",
+    "drag.rs",
+    "batch.rs",
+    "device.rs",
+    "decoder.rs",
+    "surface_map.rs",
+    "surface_state.rs",
+    "surface.rs",
 ];
 
 fn header_file() -> PathBuf {

@@ -7,7 +7,7 @@ mod common;
 use core::time::Duration;
 use std::time::Instant;
 
-use common::player::Player;
+use common::player::{Held, Player, Round, Vertices};
 use common::{other_package, package};
 use rand::{Rng, SeedableRng, seq::IndexedRandom};
 use rand_chacha::ChaCha8Rng;
@@ -98,11 +98,57 @@ fn play(rng: &mut ChaCha8Rng, player: &mut Player) -> bool {
     overflowed
 }
 
+/// Vertex buffer, held vertices, fast tier and batch of a mutant. Returns whether a drag or a frame overflowed.
+fn use_all(rng: &mut ChaCha8Rng, player: &mut Player, package: &[u8]) -> bool {
+    let mut vertices = Vertices::new(player);
+    vertices.write(player).expect("the layout is sound");
+    let (floats, _) = vertices.bytes.as_chunks::<4>();
+    assert!(floats.iter().all(|bytes| f32::from_ne_bytes(*bytes).is_finite()));
+
+    let mut overflowed = false;
+    let held = Held::new(player, 2);
+    for _ in 0..3 {
+        let vertex = rng.random_range(0..player.info.vertex_count + 1);
+        let target = core::array::from_fn(|_| *WEIGHTS.choose(rng).expect("some"));
+        let (added, aimed) = (held.add(player, vertex), held.aim(vertex, target));
+        assert!(![added, aimed].contains(&SinewStatus::Internal), "{added:?} {aimed:?}");
+        match held.drag(player) {
+            Ok(report) => assert!(report.step_count <= 2),
+            Err(SinewStatus::HeldOverflow) => overflowed = true,
+            Err(other) => panic!("{other:?}"),
+        }
+    }
+    let mut weights = vec![f32::NAN; player.control_count as usize];
+    // SAFETY: the player's memory stands.
+    let status = unsafe { sinew_controls_get_all(player.controls, weights.as_mut_ptr(), weights.len()) };
+    assert_eq!(status, SinewStatus::Ok);
+    assert!(weights.iter().all(|weight| weight.is_finite()));
+
+    let mut fast = None;
+    if player.info.fast_node_count > 0 {
+        let mut own = Player::of_tier(package, SinewTier::Fast).expect("it opened");
+        overflowed |= play(rng, &mut own);
+        fast = Some(own);
+    }
+    let mut instances = vec![player.instance()];
+    instances.extend(fast.as_mut().map(Player::instance));
+    let round = Round::new(player.basis, &instances);
+    assert_eq!(round.play(player.basis), instances.len());
+    for n in 0..instances.len() {
+        let status = round.report(n).status;
+        assert!(
+            matches!(status, SinewStatus::Ok | SinewStatus::FrameOverflow),
+            "{status:?}"
+        );
+    }
+    overflowed
+}
+
 #[test]
 fn what_opens_plays() {
     let whole = [package(), other_package()];
     let start = Instant::now();
-    let (mut case_count, mut opened, mut overflowed) = (0, 0, 0);
+    let (mut case_count, mut opened, mut overflowed, mut overflowed_elsewhere) = (0, 0, 0, 0);
     for case in 0..CASE_COUNT {
         if start.elapsed() > TIME_MAX {
             println!("stopped after {case} of {CASE_COUNT} cases");
@@ -116,6 +162,7 @@ fn what_opens_plays() {
             Ok(mut player) => {
                 opened += 1;
                 overflowed += u32::from(play(&mut rng, &mut player));
+                overflowed_elsewhere += u32::from(use_all(&mut rng, &mut player, &mutant));
             }
             Err(status) => assert!(
                 status as i32 >= SinewStatus::PackageTooShort as i32,
@@ -123,7 +170,10 @@ fn what_opens_plays() {
             ),
         }
     }
-    println!("{case_count} mutants: {opened} opened, {overflowed} overflowed in a frame");
+    println!(
+        "{case_count} mutants: {opened} opened, {overflowed} overflowed in a frame, {overflowed_elsewhere} in a drag or \
+         the fast tier"
+    );
     assert!(opened > case_count / 10, "{opened}");
-    assert!(overflowed > 0);
+    assert!(overflowed > 0 && overflowed_elsewhere > 0);
 }

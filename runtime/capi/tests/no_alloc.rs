@@ -8,7 +8,7 @@ use core::cell::Cell;
 use core::ptr::{null, null_mut};
 use std::alloc::System;
 
-use common::player::{Memory, Player, sized};
+use common::player::{Held, Memory, Player, Round, Vertices, layout_bytes, sized};
 use common::{other_package, package};
 use sinew::*;
 
@@ -153,6 +153,66 @@ fn frames_that_overflow_allocate_nothing() {
         assert_eq!(player.frame(), Err(SinewStatus::FrameOverflow));
     });
     assert_eq!(count, 0);
+}
+
+#[test]
+fn knobs_drags_buffers_and_batches_allocate_nothing() {
+    let bytes = package();
+    let mut player = Player::new(&bytes).expect("valid");
+    let mut fast = Player::of_tier(&bytes, SinewTier::Fast).expect("it has one");
+    let (held, mut vertices) = (Held::new(&player, 2), Vertices::new(&player));
+    let round = Round::new(player.basis, &[player.instance(), fast.instance()]);
+    let mut settings = sized::<SinewSurfaceSettings>();
+    // SAFETY: zero is as usual everywhere else.
+    let settings = unsafe {
+        (*settings.as_mut_ptr()).knob_count = 4;
+        settings.assume_init()
+    };
+    let (mut decoder, mut surface) = (null_mut(), null_mut());
+    // SAFETY: the memory stands.
+    unsafe {
+        let mut memory = Memory::new(layout_bytes(|layout| sinew_decoder_layout(layout)));
+        let mut more = Memory::new(layout_bytes(|layout| {
+            sinew_surface_layout(player.basis, &settings, layout, null_mut())
+        }));
+        let (mut reading, mut counters) = (sized::<SinewReading>(), sized::<SinewCounters>());
+        let line = b"0|512|1023|7\r\n7|100|3|1\r\noops\r\n";
+        let mut moved = 0;
+        let count = requests(|| {
+            let (at, room) = (memory.pointer(), memory.bytes());
+            let status = sinew_decoder_open(SINEW_ABI_VERSION, null(), at, room, &mut decoder, null_mut());
+            assert_eq!(status, SinewStatus::Ok);
+            let (at, room) = (more.pointer(), more.bytes());
+            let status = sinew_surface_create(player.basis, &settings, at, room, &mut surface, null_mut());
+            assert_eq!(status, SinewStatus::Ok);
+            assert_eq!(held.add(&player, 1), SinewStatus::Ok);
+            for frame in 0..200 {
+                let (now_us, mut taken) = (frame * 16_667, 0);
+                let status = sinew_decoder_feed(decoder, now_us, line.as_ptr(), line.len(), &mut taken);
+                assert_eq!((status, taken), (SinewStatus::Ok, line.len()));
+                loop {
+                    let reading = reading.as_mut_ptr();
+                    assert_eq!(sinew_decoder_next(decoder, reading), SinewStatus::Ok);
+                    if (*reading).kind == SinewReadingKind::None as i32 {
+                        break;
+                    }
+                    assert_eq!(sinew_surface_take(surface, now_us, reading), SinewStatus::Ok);
+                }
+                let status = sinew_surface_advance(surface, player.controls, now_us, null_mut());
+                assert_eq!(status, SinewStatus::Ok);
+                let status = sinew_decoder_counters(decoder, now_us, counters.as_mut_ptr());
+                assert_eq!(status, SinewStatus::Ok);
+                assert_eq!(held.aim(1, [0.1, frame as f32 * 0.01, 0.3]), SinewStatus::Ok);
+                moved += held.drag(&player).expect("finite").step_count;
+                round.begin();
+                assert_eq!(round.play(player.basis), 2);
+                vertices.write(&player).expect("sound");
+            }
+        });
+        assert_eq!(count, 0);
+        assert!(moved > 0);
+        assert_eq!((*counters.as_ptr()).bytes, 200 * line.len() as u64);
+    }
 }
 
 #[test]

@@ -10,16 +10,18 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 use sinew_formats::package::{
-    AlignedBytes, fixture::tiny_baked, fixture::tiny_compact, limits, write_baked, write_compact,
+    AlignedBytes, fixture::TinyRender, fixture::tiny_baked, fixture::tiny_compact, limits, write_baked, write_compact,
 };
 
 pub fn crate_folder() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The hand-made package.
+/// The hand-made package, with a fast tier.
 pub fn package() -> AlignedBytes {
-    write_baked(&tiny_baked().basis()).expect("the fixture is valid")
+    let mut baked = tiny_baked();
+    baked.fast = Some(baked.own_nodes());
+    write_baked(&baked.basis()).expect("the fixture is valid")
 }
 
 /// The compact package it comes from.
@@ -27,10 +29,12 @@ pub fn compact_package() -> AlignedBytes {
     write_compact(&tiny_compact().basis()).expect("the fixture is valid")
 }
 
-/// One of the same shape with another rest mesh, and a solver so stiff that large weights overflow.
+/// One of the same shape with another rest mesh, and a solver so stiff that large weights overflow; without fast tier and
+/// texture coordinates.
 pub fn other_package() -> AlignedBytes {
     let mut baked = tiny_baked();
     baked.exact.rest_positions[0][2] += 0.25;
+    baked.render = TinyRender::default();
     baked.exact.ring_weights.fill(limits::EDGE_WEIGHT);
     baked.exact.tiles.as_flattened_mut().fill(limits::FACTOR_VALUE);
     for block in &mut baked.exact.inverse_diagonals {

@@ -3,11 +3,7 @@
 use core::mem::MaybeUninit;
 use core::ptr::null_mut;
 
-use sinew::{
-    SINEW_ABI_VERSION, SinewBasis, SinewBasisInfo, SinewControls, SinewDetails, SinewFrameOptions, SinewFrameOutcome,
-    SinewFrameReport, SinewLayout, SinewStatus, SinewWorkspace, sinew_basis_info, sinew_basis_layout, sinew_basis_open,
-    sinew_controls_create, sinew_controls_layout, sinew_frame, sinew_workspace_create, sinew_workspace_layout,
-};
+use sinew::*;
 
 /// A growing struct with its size set and the rest zero; to be read only once the library has written it.
 pub fn sized<T>() -> MaybeUninit<T> {
@@ -62,11 +58,22 @@ pub struct Player {
     pub positions: Vec<f32>,
     pub normals: Vec<f32>,
     pub control_count: u32,
+    pub info: SinewBasisInfo,
 }
 
 impl Player {
-    /// Opens and creates.
+    /// Opens and creates, for the exact tier.
     pub fn new(package: &[u8]) -> Result<Self, SinewStatus> {
+        Self::of_tier(package, SinewTier::Exact)
+    }
+
+    /// The same for a tier that the package has.
+    pub fn of_tier(package: &[u8], tier: SinewTier) -> Result<Self, SinewStatus> {
+        let options = SinewWorkspaceOptions {
+            struct_bytes: size_of::<SinewWorkspaceOptions>(),
+            tier: tier as i32,
+            kernels: SinewKernels::Widest as i32,
+        };
         // SAFETY: every pointer is to memory that lives as long as the player, of the lengths that the layouts say.
         unsafe {
             let mut basis_memory = Memory::new(layout_bytes(|layout| sinew_basis_layout(layout)));
@@ -86,9 +93,10 @@ impl Player {
             let mut info = sized::<SinewBasisInfo>();
             assert_eq!(sinew_basis_info(basis, info.as_mut_ptr()), SinewStatus::Ok);
             let info = info.assume_init();
-            let mut workspace_memory = Memory::new(layout_bytes(|layout| sinew_workspace_layout(basis, layout)));
+            let bytes = layout_bytes(|layout| sinew_workspace_layout_for(basis, &options, layout));
+            let mut workspace_memory = Memory::new(bytes);
             let (memory, bytes) = (workspace_memory.pointer(), workspace_memory.bytes());
-            let status = sinew_workspace_create(basis, memory, bytes, &mut workspace, null_mut());
+            let status = sinew_workspace_create_for(basis, &options, memory, bytes, &mut workspace, null_mut());
             assert_eq!(status, SinewStatus::Ok);
             let mut controls_memory = Memory::new(layout_bytes(|layout| sinew_controls_layout(basis, layout)));
             let (memory, bytes) = (controls_memory.pointer(), controls_memory.bytes());
@@ -103,6 +111,7 @@ impl Player {
                 positions: vec![f32::NAN; floats],
                 normals: vec![f32::NAN; floats],
                 control_count: info.control_count,
+                info,
             })
         }
     }
@@ -138,8 +147,169 @@ impl Player {
         }
     }
 
+    /// What a batch gets of this player.
+    pub fn instance(&mut self) -> SinewInstance {
+        SinewInstance {
+            workspace: self.workspace,
+            controls: self.controls,
+            positions: self.positions.as_mut_ptr(),
+            position_floats: self.positions.len(),
+            normals: self.normals.as_mut_ptr(),
+            normal_floats: self.normals.len(),
+        }
+    }
+
     /// Memory of basis, workspace and controls.
     pub fn memory(&mut self) -> &mut [Memory; 3] {
         &mut self.memory
+    }
+}
+
+/// Handles of a player's basis.
+pub struct Held {
+    _memory: Memory,
+    pub handles: *mut SinewHandles,
+}
+
+impl Held {
+    pub fn new(player: &Player, capacity: u32) -> Self {
+        let mut handles = null_mut();
+        // SAFETY: the memory is as long as the layout says and lives as long as this.
+        unsafe {
+            let bytes = layout_bytes(|layout| sinew_handles_layout(player.basis, capacity, layout));
+            let mut memory = Memory::new(bytes);
+            let (at, room) = (memory.pointer(), memory.bytes());
+            let status = sinew_handles_create(player.basis, capacity, at, room, &mut handles, null_mut());
+            assert_eq!(status, SinewStatus::Ok);
+            Self {
+                _memory: memory,
+                handles,
+            }
+        }
+    }
+
+    pub fn add(&self, player: &Player, vertex: u32) -> SinewStatus {
+        // SAFETY: the player's memory stands.
+        unsafe { sinew_handles_add(player.basis, self.handles, player.workspace, vertex, null_mut()) }
+    }
+
+    pub fn aim(&self, vertex: u32, target: [f32; 3]) -> SinewStatus {
+        // SAFETY: this memory stands.
+        unsafe { sinew_handles_target(self.handles, vertex, target.as_ptr()) }
+    }
+
+    pub fn drag(&self, player: &Player) -> Result<SinewDragReport, SinewStatus> {
+        let mut report = sized::<SinewDragReport>();
+        // SAFETY: the player's memory stands; the report is whole after a drag.
+        unsafe {
+            let (handles, out) = (self.handles, report.as_mut_ptr());
+            match sinew_drag(
+                player.basis,
+                handles,
+                player.workspace,
+                player.controls,
+                out,
+                null_mut(),
+            ) {
+                SinewStatus::Ok => Ok(report.assume_init()),
+                refused => Err(refused),
+            }
+        }
+    }
+}
+
+/// A vertex buffer of everything there is, interleaved, and its scratch.
+pub struct Vertices {
+    pub bytes: Vec<u8>,
+    scratch: Vec<f32>,
+}
+
+impl Vertices {
+    pub const STRIDE: usize = 48;
+
+    pub fn new(player: &Player) -> Self {
+        let count = player.info.render_vertex_count as usize;
+        Self {
+            bytes: vec![0; Self::STRIDE * count],
+            scratch: vec![0.0; 4 * count],
+        }
+    }
+
+    /// Writes the player's last frame.
+    pub fn write(&mut self, player: &Player) -> Result<SinewBounds, SinewStatus> {
+        let textured = |stride| if player.info.has_texture == 1 { stride } else { 0 };
+        let options = SinewVertexOptions {
+            struct_bytes: size_of::<SinewVertexOptions>(),
+            positions: player.positions.as_ptr(),
+            position_floats: player.positions.len(),
+            normals: player.normals.as_ptr(),
+            normal_floats: player.normals.len(),
+            bytes: self.bytes.as_mut_ptr(),
+            byte_count: self.bytes.len(),
+            scratch: self.scratch.as_mut_ptr(),
+            scratch_floats: self.scratch.len(),
+            position_offset: 0,
+            position_stride: Self::STRIDE,
+            normal_offset: 12,
+            normal_stride: Self::STRIDE,
+            tangent_offset: 24,
+            tangent_stride: textured(Self::STRIDE),
+            texture_offset: 40,
+            texture_stride: textured(Self::STRIDE),
+            encoding: SinewUnitEncoding::Float32 as i32,
+        };
+        let mut bounds = SinewBounds {
+            minimum: [f32::NAN; 3],
+            maximum: [f32::NAN; 3],
+        };
+        // SAFETY: all memory stands.
+        match unsafe { sinew_vertices_write(player.basis, &options, &mut bounds, null_mut()) } {
+            SinewStatus::Ok => Ok(bounds),
+            refused => Err(refused),
+        }
+    }
+}
+
+/// A batch and its memory.
+pub struct Round {
+    _memory: Memory,
+    pub batch: *mut SinewBatch,
+}
+
+impl Round {
+    pub fn new(basis: *const SinewBasis, instances: &[SinewInstance]) -> Self {
+        let mut batch = null_mut();
+        // SAFETY: the memory is as long as the layout says and lives as long as this.
+        unsafe {
+            let mut memory = Memory::new(layout_bytes(|layout| sinew_batch_layout(instances.len(), layout)));
+            let (first, count, size) = (instances.as_ptr(), instances.len(), size_of::<SinewInstance>());
+            let (at, room) = (memory.pointer(), memory.bytes());
+            let status = sinew_batch_create(basis, first, count, size, at, room, &mut batch, null_mut());
+            assert_eq!(status, SinewStatus::Ok);
+            Self { _memory: memory, batch }
+        }
+    }
+
+    pub fn play(&self, basis: *const SinewBasis) -> usize {
+        let mut played = usize::MAX;
+        // SAFETY: this memory and that of the instances stand.
+        let status = unsafe { sinew_batch_play(basis, self.batch, &mut played, null_mut()) };
+        assert_eq!(status, SinewStatus::Ok);
+        played
+    }
+
+    pub fn begin(&self) {
+        // SAFETY: this memory stands.
+        assert_eq!(unsafe { sinew_batch_begin(self.batch) }, SinewStatus::Ok);
+    }
+
+    pub fn report(&self, instance: usize) -> SinewInstanceReport {
+        let mut report = sized::<SinewInstanceReport>();
+        // SAFETY: this memory stands; the report is whole once written.
+        unsafe {
+            let status = sinew_batch_report(self.batch, instance, report.as_mut_ptr());
+            assert_eq!(status, SinewStatus::Ok);
+            report.assume_init()
+        }
     }
 }
