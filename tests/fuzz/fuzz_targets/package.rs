@@ -30,8 +30,11 @@ fn layout_bytes(ask: impl FnOnce(*mut SinewLayout) -> SinewStatus) -> usize {
     layout.size_bytes
 }
 
-static PACKAGE: LazyLock<AlignedBytes> =
-    LazyLock::new(|| write_baked(&tiny_baked().basis()).expect("the fixture is valid"));
+static PACKAGE: LazyLock<AlignedBytes> = LazyLock::new(|| {
+    let mut baked = tiny_baked();
+    baked.fast = Some(baked.own_nodes());
+    write_baked(&baked.basis()).expect("the fixture is valid")
+});
 
 /// The hand-made package with words written over; an edit is place and value, both in full.
 fn edited(edits: &[[u8; 8]]) -> AlignedBytes {
@@ -69,15 +72,9 @@ fn play(package: &[u8], settings: &[u8]) {
             assert_ne!(status, SinewStatus::Internal);
             return;
         }
-        let mut info = SinewBasisInfo {
-            struct_bytes: size_of::<SinewBasisInfo>(),
-            vertex_count: 0,
-            face_count: 0,
-            control_count: 0,
-            level_count: 0,
-            content_id: [0; 16],
-            compact_id: [0; 16],
-        };
+        // SAFETY: numbers only.
+        let mut info: SinewBasisInfo = core::mem::zeroed();
+        info.struct_bytes = size_of::<SinewBasisInfo>();
         assert_eq!(sinew_basis_info(basis, &mut info), SinewStatus::Ok);
         for control in 0..info.control_count {
             let mut name = [0; SINEW_NAME_BYTES];
@@ -122,5 +119,129 @@ fn play(package: &[u8], settings: &[u8]) {
             );
             assert!(positions.iter().chain(&normals).all(|x| x.is_finite()));
         }
+        write_vertices(basis, &info, &positions, &normals);
+        drag(basis, &info, workspace, controls, settings);
+        if info.fast_node_count > 0 {
+            play_fast(basis, controls, &mut positions, &mut normals);
+        }
+    }
+}
+
+/// A vertex buffer of everything that the package has.
+unsafe fn write_vertices(basis: *const SinewBasis, info: &SinewBasisInfo, positions: &[f32], normals: &[f32]) {
+    let count = info.render_vertex_count as usize;
+    let (mut bytes, mut scratch) = (vec![0_u8; 48 * count], vec![0.0_f32; 4 * count]);
+    let textured = if info.has_texture == 1 { 48 } else { 0 };
+    let options = SinewVertexOptions {
+        struct_bytes: size_of::<SinewVertexOptions>(),
+        positions: positions.as_ptr(),
+        position_floats: positions.len(),
+        normals: normals.as_ptr(),
+        normal_floats: normals.len(),
+        bytes: bytes.as_mut_ptr(),
+        byte_count: bytes.len(),
+        scratch: scratch.as_mut_ptr(),
+        scratch_floats: scratch.len(),
+        position_offset: 0,
+        position_stride: 48,
+        normal_offset: 12,
+        normal_stride: 48,
+        tangent_offset: 24,
+        tangent_stride: textured,
+        texture_offset: 40,
+        texture_stride: textured,
+        encoding: 0,
+    };
+    // SAFETY: all memory stands.
+    let status = unsafe { sinew_vertices_write(basis, &options, null_mut(), null_mut()) };
+    assert_eq!(status, SinewStatus::Ok);
+    assert!(
+        bytes
+            .as_chunks::<4>()
+            .0
+            .iter()
+            .all(|x| f32::from_ne_bytes(*x).is_finite())
+    );
+}
+
+/// Holds two vertices and drags them to where the settings say.
+unsafe fn drag(
+    basis: *const SinewBasis,
+    info: &SinewBasisInfo,
+    workspace: *mut SinewWorkspace,
+    controls: *mut SinewControls,
+    settings: &[u8],
+) {
+    unsafe {
+        let mut handles = null_mut();
+        let mut room = memory(layout_bytes(|layout| sinew_handles_layout(basis, 2, layout)));
+        let (at, bytes) = (room.as_mut_ptr().cast(), 64 * room.len());
+        let status = sinew_handles_create(basis, 2, at, bytes, &mut handles, null_mut());
+        assert_eq!(status, SinewStatus::Ok);
+        for &[vertex, aim @ ..] in settings.as_chunks::<5>().0.iter().take(8) {
+            let vertex = u32::from(vertex) % (info.vertex_count + 1);
+            let number = f32::from_le_bytes(aim);
+            let added = sinew_handles_add(basis, handles, workspace, vertex, null_mut());
+            let aimed = sinew_handles_target(handles, vertex, [number, 0.5, -number].as_ptr());
+            let dragged = sinew_drag(basis, handles, workspace, controls, null_mut(), null_mut());
+            assert!(![added, aimed].contains(&SinewStatus::Internal));
+            assert!(
+                matches!(dragged, SinewStatus::Ok | SinewStatus::HeldOverflow),
+                "{dragged:?}"
+            );
+        }
+        let mut weights = vec![f32::NAN; info.control_count as usize];
+        let status = sinew_controls_get_all(controls, weights.as_mut_ptr(), weights.len());
+        assert_eq!(status, SinewStatus::Ok);
+        assert!(weights.iter().all(|weight| weight.is_finite()));
+    }
+}
+
+/// A frame of the fast tier, as a batch of one.
+unsafe fn play_fast(
+    basis: *const SinewBasis,
+    controls: *mut SinewControls,
+    positions: &mut [f32],
+    normals: &mut [f32],
+) {
+    unsafe {
+        let options = SinewWorkspaceOptions {
+            struct_bytes: size_of::<SinewWorkspaceOptions>(),
+            tier: SinewTier::Fast as i32,
+            kernels: 0,
+        };
+        let (mut workspace, mut batch) = (null_mut(), null_mut());
+        let mut room = memory(layout_bytes(|layout| {
+            sinew_workspace_layout_for(basis, &options, layout)
+        }));
+        let (at, bytes) = (room.as_mut_ptr().cast(), 64 * room.len());
+        let status = sinew_workspace_create_for(basis, &options, at, bytes, &mut workspace, null_mut());
+        assert_eq!(status, SinewStatus::Ok);
+        let instance = SinewInstance {
+            workspace,
+            controls,
+            positions: positions.as_mut_ptr(),
+            position_floats: positions.len(),
+            normals: normals.as_mut_ptr(),
+            normal_floats: normals.len(),
+        };
+        let mut room = memory(layout_bytes(|layout| sinew_batch_layout(1, layout)));
+        let (at, bytes) = (room.as_mut_ptr().cast(), 64 * room.len());
+        let size = size_of::<SinewInstance>();
+        let status = sinew_batch_create(basis, &instance, 1, size, at, bytes, &mut batch, null_mut());
+        assert_eq!(status, SinewStatus::Ok);
+        assert_eq!(sinew_batch_play(basis, batch, null_mut(), null_mut()), SinewStatus::Ok);
+        let mut report = SinewInstanceReport {
+            struct_bytes: size_of::<SinewInstanceReport>(),
+            status: SinewStatus::Internal,
+            outcome: 0,
+        };
+        assert_eq!(sinew_batch_report(batch, 0, &mut report), SinewStatus::Ok);
+        let status = report.status;
+        assert!(
+            matches!(status, SinewStatus::Ok | SinewStatus::FrameOverflow),
+            "{status:?}"
+        );
+        assert!(positions.iter().chain(normals.iter()).all(|x| x.is_finite()));
     }
 }

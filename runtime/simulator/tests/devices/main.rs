@@ -6,6 +6,7 @@ mod faults;
 mod late;
 mod no_jump;
 mod protocols;
+mod socat;
 
 use core::time::Duration;
 use std::path::Path;

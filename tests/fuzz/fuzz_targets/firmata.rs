@@ -1,0 +1,9 @@
+//! Firmata: analog reports and what lies between them.
+#![no_main]
+
+mod knobs;
+
+use libfuzzer_sys::fuzz_target;
+use sinew_runtime::input::Protocol;
+
+fuzz_target!(|data: &[u8]| knobs::check(Some(Protocol::Firmata), data));

@@ -1,0 +1,9 @@
+//! Text lines: deej, CSV, labels, prints between them.
+#![no_main]
+
+mod knobs;
+
+use libfuzzer_sys::fuzz_target;
+use sinew_runtime::input::Protocol;
+
+fuzz_target!(|data: &[u8]| knobs::check(Some(Protocol::Lines), data));

@@ -1,0 +1,9 @@
+//! Sinew's own framed packets: byte stuffing, checksum, HELLO.
+#![no_main]
+
+mod knobs;
+
+use libfuzzer_sys::fuzz_target;
+use sinew_runtime::input::Protocol;
+
+fuzz_target!(|data: &[u8]| knobs::check(Some(Protocol::Packets), data));
