@@ -2,6 +2,8 @@
 
 use xxhash_rust::xxh3::Xxh3;
 
+use crate::count::count;
+
 /// Sums up frames.
 pub struct WeightsChecksum {
     hash: Box<Xxh3>,
@@ -43,8 +45,8 @@ impl core::fmt::Display for WeightsChecksum {
     fn fmt(&self, out: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         write!(
             out,
-            "{} frames, weights checksum {:016x}",
-            self.frames,
+            "{}, weights checksum {:016x}",
+            count(self.frames, "frame"),
             self.hash.digest()
         )
     }

@@ -7,6 +7,7 @@ pub mod calibration;
 pub mod checksum;
 pub mod commands;
 pub mod config;
+pub mod count;
 pub mod device;
 pub mod export;
 pub mod model;

@@ -76,7 +76,7 @@ fn a_cable_that_is_pulled_is_said_and_the_show_goes_on() {
     let live = Ran::new("play", child.wait_with_output().unwrap()).expect(0);
     let live = live.says(&[
         "warning: unplugged: holding, then easing to rest",
-        "unplugged 1 times, back 1 times",
+        "unplugged 1 time, back 1 time",
     ]);
     simulator.kill().unwrap();
     simulator.wait().unwrap();
@@ -102,7 +102,7 @@ fn what_is_calibrated_is_found_again_and_used() {
     let ran = stage.run("knobs calibrate --serial box --for 4s", "").expect(0);
     let ran = ran.says(&[
         "knob 1: it was not turned; turn it from stop to stop",
-        "1 knobs of serial box measured",
+        "1 knob of serial box measured",
     ]);
     assert!(ran.err.contains(".config/sinew/calibration.toml") || cfg!(target_os = "macos"));
     let text = std::fs::read_to_string(ran.after("written to ")).unwrap();

@@ -132,7 +132,7 @@ fn a_cut_take_is_played_as_far_as_it_goes() {
     stage
         .run("play model.sinew --headless --replay cut.take", "")
         .expect(0)
-        .says(&["was not closed", "bytes behind"]);
+        .says(&["was not closed", "behind the last whole piece"]);
     std::fs::write(stage.path("cut.take"), &bytes[..20]).unwrap();
     stage
         .run("play model.sinew --headless --replay cut.take", "")

@@ -16,6 +16,7 @@ use sinew_runtime::input::{Clock, SurfaceLayout};
 
 use super::{Failure, catch_interrupts, interrupted, parse_duration, read_choice};
 use crate::calibration::{Calibrations, default_path};
+use crate::count::count;
 use crate::device::{Device, DeviceArguments, identity, listen, open};
 use crate::model;
 use crate::play::{Live, LiveOutcome, Scene, SceneMemory, start_typed_lines};
@@ -243,9 +244,12 @@ fn live(arguments: &PlayArguments, basis: &Basis<'_>, quiet: bool) -> Result<(),
     let knobs = wiring.borrowed_knobs();
     let map = wiring.map(*basis, &knobs).into_diagnostic()?;
     if heard.device.is_some() {
-        let found = heard.knobs.len();
+        let found = heard.knobs.len() as u64;
         let calibrated = if calibration.is_some() { ", calibrated" } else { "" };
-        say(quiet, &format!("{}: {found} knobs heard{calibrated}", heard.name));
+        say(
+            quiet,
+            &format!("{}: {} heard{calibrated}", heard.name, count(found, "knob")),
+        );
     }
 
     let mut memory = SceneMemory::for_basis(basis);
@@ -291,8 +295,8 @@ fn summarize(outcome: &LiveOutcome, live: Live<'_>, quiet: bool) -> Result<(), F
         say(
             quiet,
             &format!(
-                "{} frames were left out because one before them took too long",
-                outcome.missed
+                "{} left out because one before took too long",
+                count(outcome.missed, "frame")
             ),
         );
     }
@@ -307,8 +311,13 @@ fn summarize(outcome: &LiveOutcome, live: Live<'_>, quiet: bool) -> Result<(), F
         say(
             quiet,
             &format!(
-                "{}: {} readings, {} of them too late to matter; {} messages refused{reason}; unplugged {} times, back {} times",
-                status.port, counts.events, counts.dropped, counts.bad, counts.unplugs, counts.replugs
+                "{}: {}, {} of them too late to matter; {} refused{reason}; unplugged {}, back {}",
+                status.port,
+                count(counts.events, "reading"),
+                counts.dropped,
+                count(counts.bad, "message"),
+                count(counts.unplugs, "time"),
+                count(counts.replugs, "time")
             ),
         );
     }

@@ -15,6 +15,8 @@ pub use packets::{DATAGRAM_FLOATS, Kind, write_datagrams};
 pub use spec::StreamSpec;
 use write::Sink;
 
+use crate::count::count;
+
 /// Buffers of a stream: one that is filled, one that waits, one that is written.
 const BUFFERS: usize = 3;
 
@@ -165,7 +167,7 @@ impl Drop for Stream {
 
 impl core::fmt::Display for StreamSummary {
     fn fmt(&self, out: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(out, "stream {}: {} frames", self.name, self.sent)?;
+        write!(out, "stream {}: {}", self.name, count(self.sent, "frame"))?;
         if self.dropped > 0 {
             write!(out, ", {} left out because it was behind", self.dropped)?;
         }

@@ -8,6 +8,7 @@ use ratatui::widgets::Paragraph;
 use sinew_runtime::input::TakeoverState;
 
 use super::words;
+use crate::count::count;
 use crate::snapshot::{Labels, Snapshot};
 
 const NAME: usize = 14;
@@ -42,7 +43,7 @@ pub fn draw(frame: &mut Frame<'_>, labels: &Labels, snapshot: &Snapshot) {
     }
     foot.push(Line::raw(rates(snapshot)));
     if let Some(recording) = &snapshot.recording {
-        let text = format!("recording {}, {} frames", recording.file, recording.frames);
+        let text = format!("recording {}, {}", recording.file, count(recording.frames, "frame"));
         foot.push(Line::styled(text, Style::new().fg(Color::Red)));
     }
     for warning in words::warnings(snapshot) {

@@ -4,6 +4,7 @@
 use sinew_runtime::input::protocol::Recognition;
 use sinew_runtime::input::{DeviceStatus, Direction, Link, TakeoverState};
 
+use crate::count::count;
 use crate::snapshot::{Labels, Snapshot};
 
 /// What a knob must do, or why it moves nothing; empty while it moves its component.
@@ -108,15 +109,15 @@ pub fn warnings(snapshot: &Snapshot) -> Vec<String> {
         }
         if counters.clamped > 0 {
             warnings.push(format!(
-                "{} readings beyond their scale: set full_scale",
-                counters.clamped
+                "{} beyond their scale: set full_scale",
+                count(counters.clamped, "reading")
             ));
         }
     }
     if snapshot.surface.unlisted > 0 {
         warnings.push(format!(
-            "{} readings of knobs that the map has not",
-            snapshot.surface.unlisted
+            "{} of knobs that the map has not",
+            count(snapshot.surface.unlisted, "reading")
         ));
     }
     if snapshot.surface.supply > 0.0 && snapshot.surface.supply < 0.98 {
@@ -124,8 +125,8 @@ pub fn warnings(snapshot: &Snapshot) -> Vec<String> {
     }
     if snapshot.stream_dropped > 0 {
         warnings.push(format!(
-            "a stream is behind: {} frames left out",
-            snapshot.stream_dropped
+            "a stream is behind: {} left out",
+            count(snapshot.stream_dropped, "frame")
         ));
     }
     warnings.extend(snapshot.trouble.clone());

@@ -112,7 +112,11 @@ pub fn run(arguments: &CalibrateArguments, quiet: bool) -> Result<(), Failure> {
         if follow_supply {
             eprintln!("the supply sagged meanwhile: readings will be corrected for it");
         }
-        eprintln!("{count} knobs of {device} measured; written to {}", path.display());
+        eprintln!(
+            "{} of {device} measured; written to {}",
+            crate::count::count(count as u64, "knob"),
+            path.display()
+        );
     }
     Ok(())
 }

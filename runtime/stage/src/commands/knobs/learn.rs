@@ -16,6 +16,7 @@ use crate::calibration::quoted;
 use crate::commands::{Failure, catch_interrupts, interrupted, parse_duration, read_choice};
 use crate::config::keys::WholeOrText;
 use crate::config::{COMMANDS, KnobsFile, Place, midi_words};
+use crate::count::count;
 use crate::device::{DeviceArguments, Touch};
 use crate::model;
 use crate::wiring::{resolve, unknown_component};
@@ -129,7 +130,11 @@ pub fn run(arguments: &LearnArguments, quiet: bool) -> Result<(), Failure> {
     resolve(&file, &basis, &[], None)?;
     save_package(&arguments.output, file.text.as_bytes()).into_diagnostic()?;
     if !quiet {
-        eprintln!("{} knobs written to {}", learned.len(), arguments.output.display());
+        eprintln!(
+            "{} written to {}",
+            count(learned.len() as u64, "knob"),
+            arguments.output.display()
+        );
     }
     Ok(())
 }

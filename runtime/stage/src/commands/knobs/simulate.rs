@@ -12,6 +12,7 @@ use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use sinew_simulator::{BoxSettings, COMMANDS, Command, Dialect, KnobBox, Port, Script, Simulator};
 
 use crate::commands::{Failure, catch_interrupts, interrupted, parse_duration};
+use crate::count::count;
 
 /// What stands below the options: the commands are the simulator's own list.
 fn help() -> String {
@@ -81,8 +82,8 @@ pub fn run(arguments: &SimulateArguments, quiet: bool) -> Result<(), Failure> {
     }
     if !quiet {
         eprintln!(
-            "a box with {} knobs that speaks {} is at {}",
-            arguments.count,
+            "a box with {} that speaks {} is at {}",
+            count(arguments.count.into(), "knob"),
             arguments.speak.name(),
             path.display()
         );
@@ -112,8 +113,11 @@ pub fn run(arguments: &SimulateArguments, quiet: bool) -> Result<(), Failure> {
     let status = simulator.status();
     if !quiet {
         eprintln!(
-            "{} bytes sent, {} heard, {} that nobody read; unplugged {} times",
-            status.sent_bytes, status.heard_bytes, status.lost_bytes, status.unplugs
+            "{} sent, {} heard, {} that nobody read; unplugged {}",
+            count(status.sent_bytes, "byte"),
+            status.heard_bytes,
+            status.lost_bytes,
+            count(status.unplugs, "time")
         );
     }
     if interrupted() {

@@ -11,6 +11,7 @@ use sinew_runtime::take::Take;
 
 use super::{PlayArguments, Watcher, draws, finish_streams, say, start_streams, title};
 use crate::commands::{Failure, catch_interrupts};
+use crate::count::count;
 use crate::export::WeightsTable;
 use crate::play::{Replay, Scene, SceneMemory, TakeParts};
 use crate::snapshot::{Board, Labels};
@@ -90,7 +91,8 @@ pub fn run(arguments: &PlayArguments, basis: &Basis<'_>, path: &Path, quiet: boo
         say(
             quiet,
             &format!(
-                "{rows} frames of weights written to {}",
+                "{} of weights written to {}",
+                count(rows as u64, "frame"),
                 arguments.export.as_deref().unwrap_or(path).display()
             ),
         );
@@ -122,22 +124,28 @@ fn describe(take: &Take<'_>, basis: &Basis<'_>, parts: &TakeParts<'_>, path: &Pa
     say(
         quiet,
         &format!(
-            "{}: {} records of {}",
+            "{}: {} of {}",
             path.display(),
-            take.record_count(),
+            count(take.record_count() as u64, "record"),
             take.device()
         ),
     );
     if !take.is_closed() {
         let lost = match take.lost_bytes() {
             0 => "nothing that was written is lost".to_owned(),
-            lost => format!("{lost} bytes behind the last whole piece are lost"),
+            lost => format!(
+                "what was behind the last whole piece is lost, {}",
+                count(lost as u64, "byte")
+            ),
         };
         say(quiet, &format!("note: the take was not closed; {lost}"));
     } else if take.lost_bytes() > 0 {
         say(
             quiet,
-            &format!("note: {} bytes behind its end are not read", take.lost_bytes()),
+            &format!(
+                "note: what is behind its end is not read, {}",
+                count(take.lost_bytes() as u64, "byte")
+            ),
         );
     }
     if take.compact_id() != basis.compact_id() {
