@@ -9,7 +9,7 @@ use rkyv::{
     Archive, ArchiveUnsized, Place, Serialize, SerializeUnsized,
     boxed::{ArchivedBox, BoxResolver},
     rancor::Fallible,
-    ser::{Writer, WriterExt},
+    ser::{Positional, Writer, WriterExt},
     with::{ArchiveWith, InlineAsBox, SerializeWith},
 };
 
@@ -44,9 +44,11 @@ where
     [T]: SerializeUnsized<S>,
 {
     fn serialize_with(field: &&[T], serializer: &mut S) -> Result<Self::Resolver, S::Error> {
-        // In two steps: rkyv pads by at most 32 bytes at once.
+        // In steps: rkyv pads by less than 32 bytes at once.
         serializer.align(CACHE_LINE_BYTES / 2)?;
-        serializer.align(CACHE_LINE_BYTES)?;
+        while !serializer.pos().is_multiple_of(CACHE_LINE_BYTES) {
+            serializer.pad(CACHE_LINE_BYTES / 4)?;
+        }
         ArchivedBox::serialize_from_ref(*field, serializer)
     }
 }
