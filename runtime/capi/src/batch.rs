@@ -127,7 +127,7 @@ pub unsafe extern "C" fn sinew_batch_layout(instance_count: usize, layout: *mut 
 }
 
 /// Makes a batch of instances, with its first round begun. Checks each against each, so it takes time with the square of
-/// their number: some ten milliseconds for a thousand.
+/// their number.
 ///
 /// `instances`, `instance_count`, `instance_bytes`: copied; the last is `sizeof(SinewInstance)`. Handles are of `basis`;
 /// those that are of other content are refused when they are played.
