@@ -78,7 +78,7 @@ impl LeastSquares for PositionMisfit<'_> {
         let rigid = rigid_directions(&posed);
         let mut columns = self.model.tangents(weights);
         for column in &mut columns {
-            remove_directions(&rigid, column);
+            remove_directions(&rigid, column, |x| x as f32);
         }
         let products = columns.iter().map(|column| {
             let values = column.as_flattened().iter().zip(residual.as_flattened());

@@ -21,7 +21,10 @@ use crate::baselines::pca::PrincipalComponents;
 use crate::baselines::splocs::{SplocsSettings, splocs};
 use crate::baselines::tan::{TanSettings, train};
 use crate::components::position_modes::keep_linear_algebra_serial;
-use crate::evaluate::{EvaluationError, EvaluationInput, FeatureDecoder, NormalisedPair, Scores, evaluate, score};
+use crate::evaluate::{
+    EvaluationError, EvaluationInput, FeatureDecoder, FeatureMetric, FeatureProjection, NormalisedPair, Scores,
+    evaluate, score,
+};
 use crate::features::scaler::FeatureScaler;
 use crate::learn::prepare::Prepared;
 use crate::learn::{LearnError, Reporter, RunOptions, learn};
@@ -341,10 +344,12 @@ impl Run<'_, '_> {
             stretch_scale: view.stretch_scale(),
         };
         let own = &bench.prepared.scaler;
+        let metric = FeatureMetric::new(&bench.prepared.system, scaler.scales(), &bench.areas);
+        let projection = FeatureProjection::new(&decoder, metric);
         let mut train_weights = vec![vec![0.0; decoder.component_count()]];
         train_weights.par_extend(bench.prepared.network.par_iter().map(|shape| {
             let features = scaler.to_network(&own.from_network(shape));
-            decoder.project(&features, &bench.areas, vec![0.0; decoder.component_count()])
+            projection.weights(&features, vec![0.0; decoder.component_count()])
         }));
         let model = GradientModel {
             decoder: Box::new(decoder),

@@ -11,15 +11,20 @@ use sinew_formats::{
 };
 use sinew_runtime::{Basis, Workspace, WorkspaceError, WorkspaceLayout};
 
-use super::{Encoding, FeatureDecoder, PlayError, Player, ScoreError, Scores, StackEncoder, project_positions, score};
+use super::{
+    Encoding, FeatureDecoder, FeatureMetric, FeatureProjection, PlayError, Player, ScoreError, Scores, StackEncoder,
+    project_positions, score,
+};
 use crate::{
     bake::{BakeError, Surface, bake},
     features::{
         acap::features_of_shape,
         align::{RigidMotion, widened},
         gradient::{FeatureSettings, GradientFit},
+        reconstruct::PoissonSystem,
         scaler::FeatureScaler,
     },
+    mesh::sparse_factor::FactorError,
 };
 
 /// What is measured, and on what.
@@ -131,6 +136,9 @@ pub enum EvaluationError {
         /// Why.
         source: PlayError,
     },
+    /// The mesh's matrix cannot be factored.
+    #[error("the mesh cannot be solved on")]
+    Factor(#[from] FactorError),
     /// No memory for the runtime.
     #[error("the runtime's workspace cannot be made")]
     Workspace(#[from] WorkspaceError),
@@ -163,12 +171,13 @@ pub fn evaluate(
     let surface = &bench.surface;
     let fit = GradientFit::new(&surface.topology, &surface.rest, &input.settings);
     let encoder = StackEncoder::new(&package, &surface.topology);
+    let projection = bench.projection();
     let done = AtomicUsize::new(0);
     let results: Vec<ShapeResult> = input
         .test_shapes
         .par_iter()
         .map(|&m| {
-            let result = bench.measure(&fit, &encoder, m, &input.sequence.shapes[m]);
+            let result = bench.measure(&fit, &encoder, &projection, m, &input.sequence.shapes[m]);
             progress(done.fetch_add(1, Ordering::Relaxed) + 1);
             result
         })
@@ -252,6 +261,7 @@ struct Bench<'b> {
     surface: Surface,
     areas: Vec<f64>,
     scaler: FeatureScaler,
+    system: PoissonSystem,
     decoder: FeatureDecoder,
     basis: Basis<'b>,
     layout: WorkspaceLayout,
@@ -265,6 +275,8 @@ impl<'b> Bench<'b> {
             rotation_scale: package.rotation_scale(),
             stretch_scale: package.stretch_scale(),
         };
+        let anchor = package.anchor_vertex() as usize;
+        let system = PoissonSystem::new(&surface.topology, &surface.weights, &surface.rest, anchor)?;
         let decoder = FeatureDecoder::new(&BakedView::open(baked)?);
         let basis = Basis::open(baked)?;
         let layout = WorkspaceLayout::for_basis(&basis);
@@ -272,16 +284,23 @@ impl<'b> Bench<'b> {
             surface,
             areas,
             scaler,
+            system,
             decoder,
             basis,
             layout,
         })
     }
 
+    fn projection(&self) -> FeatureProjection<'_> {
+        let metric = FeatureMetric::new(&self.system, self.scaler.scales(), &self.areas);
+        FeatureProjection::new(&self.decoder, metric)
+    }
+
     fn measure(
         &self,
         fit: &GradientFit<'_>,
         encoder: &StackEncoder<'_>,
+        projection: &FeatureProjection<'_>,
         shape: usize,
         positions: &[[f32; 3]],
     ) -> Result<ShapeResult, EvaluationError> {
@@ -296,7 +315,7 @@ impl<'b> Bench<'b> {
         let mut player = Player::new(&self.basis, Workspace::new(&self.basis, &mut memory)?);
         let fail = |source| EvaluationError::Play { shape, source };
         let encoding = encoder.encode(&features);
-        let feature_weights = self.decoder.project(&features, &self.areas, encoding.weights.clone());
+        let feature_weights = projection.weights(&features, encoding.weights.clone());
         let position_weights = project_positions(&mut player, positions, feature_weights.clone()).map_err(fail)?;
         Ok(ShapeResult {
             encoder: player.play(&encoding.weights).map_err(fail)?.to_vec(),

@@ -2,9 +2,12 @@
 
 use half::f16;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use sinew_formats::package::{BakedView, FEATURE_COUNT};
 
 use super::descent::{DescentSettings, LeastSquares, NormalEquations, descend};
+use super::feature_metric::{FeatureMetric, squared_length};
+use super::position_projection::gram_matrix;
 
 /// Converges in 3 to 6 steps from the encoder's weights; the rest is for shapes far from training.
 const DESCENT: DescentSettings = DescentSettings {
@@ -114,64 +117,120 @@ impl FeatureDecoder {
         derivatives
     }
 
-    /// Weights that minimise `sum_v areas_v |X_v - Xhat_v(z)|^2`, from `start` (the encoder's). Shapes: `features` and
-    /// `areas` `[V]`, source order; `start` `[K]`. Stretch counts as it stands in network units, already down-weighted.
-    pub fn project(&self, features: &[[f32; FEATURE_COUNT]], areas: &[f64], start: Vec<f64>) -> Vec<f64> {
-        let Ok(weights) = descend(
-            &mut FeatureMisfit {
-                decoder: self,
-                features,
-                areas,
-            },
-            start,
-            &DESCENT,
-        );
+    /// `(G C)(G C)^T` at weights of 0, for [`FeatureProjection`]: what components do to positions, together.
+    fn position_gram(&self, metric: &FeatureMetric<'_>) -> DMatrix<f64> {
+        let vertex_count = self.offsets.len() - 1;
+        let columns: Vec<Vec<[f32; 3]>> = self
+            .derivatives(&vec![0.0; self.component_count])
+            .into_par_iter()
+            .map(|entries| {
+                let mut change = vec![[0.0; FEATURE_COUNT]; vertex_count];
+                for (v, x) in entries {
+                    change[v as usize] = x;
+                }
+                let moved = metric.displacements(&change);
+                moved.iter().map(|p| p.map(|x| x as f32)).collect()
+            })
+            .collect();
+        gram_matrix(&columns)
+    }
+}
+
+/// Finds weights of features by least squares, in the metric that counts positions.
+pub struct FeatureProjection<'a> {
+    decoder: &'a FeatureDecoder,
+    metric: FeatureMetric<'a>,
+    position_gram: DMatrix<f64>,
+}
+
+impl<'a> FeatureProjection<'a> {
+    /// K solves.
+    pub fn new(decoder: &'a FeatureDecoder, metric: FeatureMetric<'a>) -> Self {
+        let position_gram = decoder.position_gram(&metric);
+        Self {
+            decoder,
+            metric,
+            position_gram,
+        }
+    }
+
+    /// Weights that bring `|X - Xhat(z)|` of the metric down, from `start` (the encoder's). Shapes: `features` `[V]`, source
+    /// order; `start` `[K]`. Stretch counts as it stands in network units, already down-weighted.
+    pub fn weights(&self, features: &[[f32; FEATURE_COUNT]], start: Vec<f64>) -> Vec<f64> {
+        let target: Vec<[f64; FEATURE_COUNT]> = features.iter().map(|x| x.map(f64::from)).collect();
+        let position_weight = self.metric.position_weight(&target);
+        let mut misfit = FeatureMisfit {
+            projection: self,
+            target,
+            position_weight,
+        };
+        let Ok(weights) = descend(&mut misfit, start, &DESCENT);
         weights
     }
 }
 
-/// Area-weighted distance of decoded features from those of one shape.
+/// Distance of decoded features from those of one shape.
 struct FeatureMisfit<'p> {
-    decoder: &'p FeatureDecoder,
-    features: &'p [[f32; FEATURE_COUNT]],
-    areas: &'p [f64],
+    projection: &'p FeatureProjection<'p>,
+    target: Vec<[f64; FEATURE_COUNT]>,
+    position_weight: f64,
+}
+
+impl FeatureMisfit<'_> {
+    fn residual(&self, weights: &[f64]) -> Vec<[f64; FEATURE_COUNT]> {
+        let decoded = self.projection.decoder.decode_all(weights);
+        let pairs = self.target.iter().zip(&decoded);
+        pairs
+            .map(|(target, decoded)| core::array::from_fn(|c| target[c] - decoded[c]))
+            .collect()
+    }
 }
 
 impl LeastSquares for FeatureMisfit<'_> {
     type Error = core::convert::Infallible;
 
     fn cost(&mut self, weights: &[f64]) -> Result<f64, Self::Error> {
-        let vertices = self.features.iter().zip(self.areas).enumerate();
-        Ok(vertices
-            .map(|(v, (target, area))| {
-                let decoded = self.decoder.decode(v, weights, |_, _| ());
-                area * (0..FEATURE_COUNT)
-                    .map(|c| (f64::from(target[c]) - decoded[c]).powi(2))
-                    .sum::<f64>()
-            })
-            .sum())
+        let metric = &self.projection.metric;
+        let residual = self.residual(weights);
+        let features: f64 = residual
+            .iter()
+            .zip(metric.areas())
+            .map(|(x, area)| area * x.iter().map(|x| x * x).sum::<f64>())
+            .sum();
+        Ok(features + self.position_weight * squared_length(&metric.displacements(&residual)))
     }
 
+    /// The gradient is exact; the matrix takes what components do to positions as it is at the reference, where the slopes
+    /// of tanh are 1, so that no step needs K solves.
     fn linearise(&mut self, weights: &[f64]) -> Result<NormalEquations, Self::Error> {
-        let component_count = self.decoder.component_count;
+        let FeatureProjection {
+            decoder,
+            metric,
+            position_gram,
+        } = self.projection;
+        let component_count = decoder.component_count;
         let mut matrix = DMatrix::zeros(component_count, component_count);
         let mut right_hand_side = DVector::zeros(component_count);
+        let residual = self.residual(weights);
+        let pull = metric.displacements_adjoint(&metric.displacements(&residual));
         // Rows are short (a vertex sees a handful of components), so the Jacobian is used vertex by vertex.
         let mut row: Vec<(usize, [f64; FEATURE_COUNT])> = Vec::new();
-        for (v, (target, area)) in self.features.iter().zip(self.areas).enumerate() {
+        for (v, area) in metric.areas().iter().enumerate() {
             row.clear();
-            let decoded = self.decoder.decode(v, weights, |entry, slope| {
+            decoder.decode(v, weights, |entry, slope| {
                 let derivative = core::array::from_fn(|c| slope[c] * f64::from(entry.value[c]));
                 row.push((entry.component as usize, derivative));
             });
-            let residual: [f64; FEATURE_COUNT] = core::array::from_fn(|c| f64::from(target[c]) - decoded[c]);
+            let force: [f64; FEATURE_COUNT] =
+                core::array::from_fn(|c| area * residual[v][c] + self.position_weight * pull[v][c]);
             for (n, (k, derivative)) in row.iter().enumerate() {
-                right_hand_side[*k] += area * dot(derivative, &residual);
+                right_hand_side[*k] += dot(derivative, &force);
                 for (l, other) in &row[..=n] {
                     matrix[(*k, *l)] += area * dot(derivative, other);
                 }
             }
         }
+        matrix += position_gram * self.position_weight;
         Ok(NormalEquations {
             matrix,
             right_hand_side,

@@ -8,6 +8,7 @@ pub(crate) mod descent;
 mod encoder;
 mod erms;
 mod evaluation;
+mod feature_metric;
 mod feature_projection;
 mod player;
 mod position_projection;
@@ -19,7 +20,8 @@ pub use erms::NormalisedPair;
 pub use evaluation::{
     ComponentCounts, Evaluation, EvaluationError, EvaluationInput, MaxPercentageError, Reconstructions, evaluate,
 };
-pub use feature_projection::FeatureDecoder;
+pub use feature_metric::{FeatureMetric, POSITION_WEIGHT};
+pub use feature_projection::{FeatureDecoder, FeatureProjection};
 pub use player::{PlayError, Player};
 pub use position_projection::project_positions;
 pub(crate) use position_projection::{gram_matrix, remove_directions, rigid_directions};

@@ -75,7 +75,7 @@ impl LeastSquares for PositionMisfit<'_, '_> {
         for k in 0..weights.len() {
             let mut column = vec![[0.0_f32; 3]; played.len()];
             self.player.differentiate(k, &mut column)?;
-            remove_directions(&rigid, &mut column);
+            remove_directions(&rigid, &mut column, |x| x as f32);
             columns.push(column);
         }
         let right_hand_side = DVector::from_iterator(
@@ -131,12 +131,17 @@ pub(crate) fn rigid_directions(positions: &[[f64; 3]]) -> Vec<Vec<[f64; 3]>> {
     directions
 }
 
-pub(crate) fn remove_directions(directions: &[Vec<[f64; 3]>], column: &mut [[f32; 3]]) {
+/// Takes the span of orthonormal `directions` out of `column`; `narrow` brings a number back to the column's kind.
+pub(crate) fn remove_directions<T: Copy + Into<f64>>(
+    directions: &[Vec<[f64; 3]>],
+    column: &mut [[T; 3]],
+    narrow: fn(f64) -> T,
+) {
     for direction in directions {
         let pairs = column.as_flattened().iter().zip(direction.as_flattened());
-        let share: f64 = pairs.map(|(&x, d)| f64::from(x) * d).sum();
+        let share: f64 = pairs.map(|(&x, d)| x.into() * d).sum();
         for (x, d) in column.as_flattened_mut().iter_mut().zip(direction.as_flattened()) {
-            *x -= (share * d) as f32;
+            *x = narrow((*x).into() - share * d);
         }
     }
 }

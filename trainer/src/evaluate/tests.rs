@@ -9,7 +9,7 @@ use sinew_runtime::{Basis, Workspace, WorkspaceLayout};
 use super::*;
 use crate::{
     bake::{Surface, bake_bytes, fixture},
-    features::{align::widened, gradient::FeatureSettings},
+    features::{align::widened, gradient::FeatureSettings, reconstruct::PoissonSystem},
 };
 
 const WEIGHTS: [f64; 7] = [0.8, -0.5, 1.0, 0.3, -0.9, 0.6, 0.4];
@@ -49,7 +49,10 @@ fn feature_projection_finds_the_weights_back() {
         .collect();
     let surface = Surface::of_package(&CompactView::open(&package).unwrap());
     let areas = surface.topology.vertex_areas(&surface.rest);
-    let found = decoder.project(&features, &areas, vec![0.0; WEIGHTS.len()]);
+    let system = PoissonSystem::new(&surface.topology, &surface.weights, &surface.rest, 0).unwrap();
+    let metric = FeatureMetric::new(&system, [1.0; 9], &areas);
+    let projection = FeatureProjection::new(&decoder, metric);
+    let found = projection.weights(&features, vec![0.0; WEIGHTS.len()]);
     assert!(largest_difference(&found, &WEIGHTS) < WEIGHT_TOLERANCE, "{found:?}");
 }
 
