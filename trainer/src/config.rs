@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::components::extract::PruneSettings;
 use crate::components::mix::MixSettings;
 use crate::features::gradient::FeatureSettings;
+use crate::learn::refine::RefineSettings;
 use crate::training::fit::FitSettings;
 
 /// Everything that decides what a training run learns, apart from the shapes themselves.
@@ -27,6 +28,8 @@ pub struct TrainConfig {
     pub fit: FitSettings,
     /// What is held out of the training shapes, and what is chosen with it.
     pub validation: ValidationSettings,
+    /// How components are refined for positions.
+    pub refine: RefineSettings,
     /// Which components are kept.
     pub prune: PruneSettings,
 }
@@ -42,6 +45,7 @@ impl Default for TrainConfig {
             start: StartSettings::default(),
             fit: FitSettings::default(),
             validation: ValidationSettings::default(),
+            refine: RefineSettings::default(),
             prune: PruneSettings::default(),
         }
     }
@@ -288,6 +292,14 @@ impl TrainConfig {
                 "[reach > 0, regions_min >= 1, regions_max >= regions_min]",
             )?;
         }
+        let refine = &self.refine;
+        check(refine.rounds <= 100, "refine.rounds", &refine.rounds, "at most 100")?;
+        check(
+            refine.samples <= 4096,
+            "refine.samples",
+            &refine.samples,
+            "at most 4096",
+        )?;
         let entries = self.prune.entries_per_vertex;
         check(entries > 0.0, "prune.entries_per_vertex", &entries, "above 0")
     }

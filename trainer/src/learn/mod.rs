@@ -2,11 +2,13 @@
 //! writing one is here, so that tests and other programs can do it too.
 //!
 //! Path of data: [`prepare`] (topology, features, distances) -> choose how to mix and where to start, by held-out shapes
-//! ([`hold_out`]) -> fit, and fit again on all shapes where they are few -> [`package`] (extract, prune, measure).
+//! ([`hold_out`]) -> fit, and fit again on all shapes where they are few -> [`refine`] for positions -> [`package`] (extract,
+//! prune, measure).
 
 pub mod hold_out;
 pub mod package;
 pub mod prepare;
+pub mod refine;
 pub mod run_folder;
 mod stages;
 
@@ -267,6 +269,8 @@ fn finish(
     earlier_steps: usize,
     reporter: &dyn Reporter,
 ) -> Result<Learned, LearnError> {
+    let all: Vec<usize> = (0..prepared.network.len()).collect();
+    let weights = refine::refine(prepared, config, &all, outcome.weights, reporter)?;
     reporter.stage("packaging", 1);
     let quality = Quality {
         validation_e_rms: outcome.best_validation.filter(|e| e.is_finite()).unwrap_or(-1.0),
@@ -279,7 +283,7 @@ fn finish(
         &sequence.name,
         train_shapes,
         sequence.shape_count(),
-        &outcome.weights,
+        &weights,
         quality,
     )?;
     reporter.advance(1, "");
