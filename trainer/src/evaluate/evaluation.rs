@@ -20,6 +20,7 @@ use crate::{
         gradient::{FeatureSettings, GradientFit},
         scaler::FeatureScaler,
     },
+    network::attention::Attention,
 };
 
 /// What is measured, and on what.
@@ -33,6 +34,8 @@ pub struct EvaluationInput<'a> {
     pub test_shapes: &'a [usize],
     /// Settings of the features, those of the training.
     pub settings: FeatureSettings,
+    /// How the network shared residuals out, as in the training.
+    pub attention: Attention,
 }
 
 /// The figures, as `sinew evaluate --json` prints them.
@@ -162,7 +165,7 @@ pub fn evaluate(
     let bench = Bench::new(&package, &baked)?;
     let surface = &bench.surface;
     let fit = GradientFit::new(&surface.topology, &surface.rest, &input.settings);
-    let encoder = StackEncoder::new(&package, &surface.topology);
+    let encoder = StackEncoder::new(&package, &surface.topology, input.attention);
     let done = AtomicUsize::new(0);
     let results: Vec<ShapeResult> = input
         .test_shapes
