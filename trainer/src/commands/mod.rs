@@ -1,5 +1,6 @@
 //! The subcommands, one file each, and what they share: how they fail, how they read sequences and packages.
 
+pub mod ablate;
 pub mod bake;
 pub mod compare;
 pub mod console;
