@@ -11,6 +11,9 @@ use crate::mesh::topology::Topology;
 use crate::network::attention::Attention;
 use crate::network::weights::{BlockWeights, LevelWeights, StackWeights, zero_convolution};
 
+/// Eigenvalues of the rows' products below this are those of rows that depend on others, or are zero.
+const DEPENDENT: f64 = 1e-3;
+
 /// Weights below this share of the strongest are left out of the mode computations.
 const WINDOW_CUT: f32 = 1e-3;
 
@@ -159,8 +162,8 @@ fn strongest_vertex(row: &[f32]) -> usize {
     best.1
 }
 
-/// Löwdin: the orthonormal rows nearest to the given ones, `(C C^T)^(-1/2) C`. Rows that depend on others are only scaled
-/// to unit length.
+/// Löwdin: the orthonormal rows nearest to the given ones, `(C C^T)^(-1/2) C`. Rows of zeros stay; what
+/// rows have beside others that they depend on is raised no further than to rows that nearly do.
 fn orthonormalise(rows: &mut Vec<Vec<f32>>) {
     for row in rows.iter_mut() {
         let length = row.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();
@@ -175,11 +178,10 @@ fn orthonormalise(rows: &mut Vec<Vec<f32>>) {
         return;
     };
     let (u, s) = (eigen.U(), eigen.S());
-    if s[0] < 1e-3 {
-        return;
-    }
     let root = Mat::<f64>::from_fn(count, count, |i, j| {
-        (0..count).map(|q| u[(i, q)] * u[(j, q)] / s[q].sqrt()).sum()
+        (0..count)
+            .map(|q| u[(i, q)] * u[(j, q)] / s[q].max(DEPENDENT).sqrt())
+            .sum()
     });
     let mixed: Vec<Vec<f32>> = (0..count)
         .map(|i| {
