@@ -148,20 +148,20 @@ pub fn variants(groups: &[Group], base: &TrainConfig, quick: bool) -> Vec<Varian
                 }
             }
             Group::Lambda1 => {
-                let factors: &[f32] = if quick {
+                let factors: &[f64] = if quick {
                     &[0.1, 1.0, 10.0]
                 } else {
                     &[0.1, 0.3, 1.0, 3.0, 10.0]
                 };
                 for factor in factors {
                     let mut config = base.clone();
-                    config.fit.loss.reconstruction_weight *= factor;
-                    let weight = config.fit.loss.reconstruction_weight;
+                    let weight = scaled(base.fit.loss.reconstruction_weight, *factor);
+                    config.fit.loss.reconstruction_weight = weight;
                     push(format!("λ1 {weight}"), vec![shortest(weight)], config);
                 }
             }
             Group::Lambda2 => {
-                let factors: &[f32] = if quick {
+                let factors: &[f64] = if quick {
                     &[0.0, 1.0, 10.0]
                 } else {
                     &[0.0, 0.1, 1.0, 10.0, 100.0]
@@ -173,7 +173,7 @@ pub fn variants(groups: &[Group], base: &TrainConfig, quick: bool) -> Vec<Varian
                 };
                 for factor in factors {
                     let mut config = base.clone();
-                    let weight = middle * factor;
+                    let weight = scaled(middle, *factor);
                     config.fit.loss.sparsity_weight = weight;
                     push(format!("λ2 {weight}"), vec![shortest(weight)], config);
                 }
@@ -219,6 +219,12 @@ fn with_components(base: &TrainConfig, components: Vec<usize>) -> TrainConfig {
 /// The number that prints as `x` does: 0.2 and not 0.20000000298.
 fn shortest(x: f32) -> f64 {
     format!("{x}").parse().unwrap_or_else(|_| f64::from(x))
+}
+
+/// `x` times a factor as people would multiply: ten times 0.02 is 0.2.
+fn scaled(x: f32, factor: f64) -> f32 {
+    let product = shortest(x) * factor;
+    format!("{product:.6e}").parse().unwrap_or(product as f32)
 }
 
 /// Ways to write the fine components of two levels as a product, at least two of each: up to `most`, spread evenly. The paper's 50
@@ -278,6 +284,7 @@ mod tests {
         assert_eq!(names(Group::Levels), ["60", "10 × 5", "4 × 2 × 6"]);
         assert_eq!(names(Group::Reach).len(), 9);
         assert_eq!(names(Group::Lambda1), ["λ1 1", "λ1 3", "λ1 10", "λ1 30", "λ1 100"]);
+        assert_eq!(names(Group::Lambda2), ["λ2 0", "λ2 0.002", "λ2 0.02", "λ2 0.2", "λ2 2"]);
         for group in Group::ALL {
             let bases = plan
                 .iter()
