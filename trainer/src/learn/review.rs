@@ -13,6 +13,8 @@ use crate::mesh::topology::{Topology, difference, is_flat, length};
 const BROKEN_STRAIN: f64 = 0.9;
 /// Nor is one that is off by less than so many times what half of the shapes are.
 const BROKEN_TIMES_MEDIAN: f64 = 10.0;
+/// A shape of less than this share of the usual size has collapsed.
+const COLLAPSED_SIZE: f64 = 0.1;
 /// With fewer shapes than this none can be told to be unlike the others.
 const JUDGED_SHAPES_MIN: usize = 4;
 /// Shapes that a notice names.
@@ -28,7 +30,8 @@ pub struct Review {
 }
 
 /// Looks at the training shapes of a sequence. Shapes that equal the reference are left out, and those that cannot be of
-/// the same subject: their edges are off ten times as much as is usual here, and by nearly their own length.
+/// the same subject: their edges are off ten times as much as is usual here, and by nearly their own length, or are a tenth
+/// as long as is usual.
 /// Errors: no shape besides the reference, a coordinate that is no finite number, nothing that moves.
 pub fn review(sequence: &MeshSequence, train_shapes: &[usize], component_count: usize) -> Result<Review, LearnError> {
     let asked: Vec<usize> = train_shapes
@@ -50,16 +53,16 @@ pub fn review(sequence: &MeshSequence, train_shapes: &[usize], component_count: 
     let topology = Topology::new(&sequence.faces, &rest);
     let mut notices = mesh_notices(&topology);
 
-    let strains = strains(sequence, &asked, &topology);
-    let median = median(&strains);
+    let (strains, sizes): (Vec<f64>, Vec<f64>) = edge_measures(sequence, &asked, &topology).into_iter().unzip();
+    let (usual_strain, usual_size) = (median(&strains), median(&sizes));
     let broken = |i: &usize| {
-        asked.len() >= JUDGED_SHAPES_MIN && strains[*i] >= BROKEN_STRAIN && strains[*i] > BROKEN_TIMES_MEDIAN * median
+        let strained = strains[*i] >= BROKEN_STRAIN && strains[*i] > BROKEN_TIMES_MEDIAN * usual_strain;
+        asked.len() >= JUDGED_SHAPES_MIN && (strained || sizes[*i] < COLLAPSED_SIZE * usual_size)
     };
     let (broken, sound): (Vec<usize>, Vec<usize>) = (0..asked.len()).partition(broken);
     if !broken.is_empty() {
         notices.push(format!(
-            "left out of training, for a typical edge is off by its own length there, ten times as much as in the other \
-             shapes: {}; look at what is wrong with it, or take it out of the sequence",
+            "left out of training, for edges there are a tenth as long as in the other shapes, or off by ten times as much: {}; look at what is wrong with it, or take it out of the sequence",
             names(sequence, broken.iter().map(|&i| asked[i]))
         ));
     }
@@ -91,22 +94,27 @@ pub fn review(sequence: &MeshSequence, train_shapes: &[usize], component_count: 
     Ok(Review { shapes, notices })
 }
 
-/// Root mean square of what edges gain or lose, over that of their lengths at rest. Shape: that of `shapes`.
-fn strains(sequence: &MeshSequence, shapes: &[usize], topology: &Topology) -> Vec<f64> {
+/// Of every shape, over the root mean square of edge lengths at rest: that of what edges gain or lose, and that of their
+/// lengths.
+fn edge_measures(sequence: &MeshSequence, shapes: &[usize], topology: &Topology) -> Vec<(f64, f64)> {
     let rest = widened(&sequence.shapes[0]);
     let mut edges = topology.edges();
     edges.retain(|&[a, b]| !topology.is_bridge(a, b));
     let length_of =
         |positions: &[[f64; 3]], &[a, b]: &[u32; 2]| length(difference(positions[a as usize], positions[b as usize]));
     let total: f64 = edges.iter().map(|edge| length_of(&rest, edge).powi(2)).sum();
-    let strain = |&m: &usize| {
+    let measures = |&m: &usize| {
         let positions = widened(&sequence.shapes[m]);
-        let off = edges
+        let lengths = edges
             .iter()
-            .map(|edge| (length_of(&positions, edge) - length_of(&rest, edge)).powi(2));
-        (off.sum::<f64>() / total.max(f64::MIN_POSITIVE)).sqrt()
+            .map(|edge| (length_of(&positions, edge), length_of(&rest, edge)));
+        let (off, long) = lengths.fold((0.0, 0.0), |(off, long), (found, rest)| {
+            (off + (found - rest).powi(2), long + found * found)
+        });
+        let share = |sum: f64| (sum / total.max(f64::MIN_POSITIVE)).sqrt();
+        (share(off), share(long))
     };
-    shapes.par_iter().map(strain).collect()
+    shapes.par_iter().map(measures).collect()
 }
 
 fn median(values: &[f64]) -> f64 {

@@ -208,15 +208,25 @@ pub(super) fn run_fit(
         ..config.fit.clone()
     };
     reporter.stage(bounds.name, bounds.steps as u64);
+    let checkpoint = folder.file(bounds.file);
     let mut failure = None;
+    let mut measured = checkpoint.as_ref().is_some_and(|path| path.exists());
     let mut validate = |weights: &StackWeights| {
         if held_out.is_empty() {
             return f32::NAN;
         }
-        held_out.error(prepared, config, weights).unwrap_or_else(|error| {
-            failure = Some(error);
-            f32::NAN
-        })
+        match held_out.error(prepared, config, weights) {
+            Ok(error) => {
+                measured = true;
+                error
+            }
+            // Weights gone wild make no package; those before them did.
+            Err(LearnError::Package(_)) if measured => f32::NAN,
+            Err(error) => {
+                failure = Some(error);
+                f32::NAN
+            }
+        }
     };
     let mut rollbacks = 0;
     let mut observe = |progress: &FitProgress| {
@@ -238,7 +248,6 @@ pub(super) fn run_fit(
             Flow::Continue
         }
     };
-    let checkpoint = folder.file(bounds.file);
     let outcome = fit(
         &input,
         weights,
