@@ -6,6 +6,7 @@
 //!
 //! Index letters everywhere: `v` vertex, `f` face, `k` component, `l` level, `m` shape, `c` coordinate.
 
+pub mod ablate;
 pub mod baselines;
 pub mod compare;
 pub mod components;

@@ -45,6 +45,8 @@ enum Command {
     Evaluate(commands::evaluate::EvaluateArguments),
     /// Measure this project beside the systems of the literature, trained on the same shapes
     Compare(commands::compare::CompareArguments),
+    /// Measure what each choice of the method is worth: the paper's ablations
+    Ablate(commands::ablate::AblateArguments),
     /// Show what is in a package: the tree of components, sizes, where it comes from
     Inspect(commands::inspect::InspectArguments),
     /// Write one pose as a mesh
@@ -64,6 +66,7 @@ fn main() -> ExitCode {
         Command::Train(arguments) => commands::train::run(&arguments, &console),
         Command::Evaluate(arguments) => commands::evaluate::run(&arguments, &console),
         Command::Compare(arguments) => commands::compare::run(&arguments, &console),
+        Command::Ablate(arguments) => commands::ablate::run(&arguments, &console),
         Command::Inspect(arguments) => commands::inspect::run(&arguments),
         Command::Frame(arguments) => commands::frame::run(&arguments, &console),
         Command::Bake(arguments) => commands::bake::run(&arguments, &console),

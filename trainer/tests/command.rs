@@ -264,3 +264,108 @@ fn methods_are_compared_on_one_split() {
         &["trained on other shapes", "--train-every"],
     );
 }
+
+#[test]
+fn both_recipes_train_and_are_kept_in_the_package() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let at = |name: &str| path(folder.path(), name);
+    run(&[
+        "synthesize",
+        "bar",
+        "-o",
+        &at("bar"),
+        "--frames",
+        "9",
+        "--vertices",
+        "120",
+        "-q",
+    ]);
+    let (bar, model) = (at("bar"), at("paper.sinew"));
+    let paper = ["--recipe", "paper", "--epochs", "7", "--components", "3,2", "-q"];
+    let mut arguments = vec!["train", &bar, "-o", &model, "--train-every", "3"];
+    arguments.extend(paper);
+    run(&arguments);
+    let kept = run(&["inspect", &model, "--config"]);
+    for line in [
+        "steps = 7",
+        "kind = \"random\"",
+        "per_step = 0",
+        "block_weight = 1.0",
+        "unit_rows = false",
+    ] {
+        assert!(kept.contains(line), "`{line}` is not in: {kept}");
+    }
+    let json: serde_json::Value = serde_json::from_str(&run(&["evaluate", &model, &bar, "--json"])).expect("JSON");
+    assert!(json["encoder"]["e_rms"].is_number(), "{json}");
+    refused(
+        &["train", &bar, "-o", &at("no.sinew"), "--recipe", "theirs"],
+        &["theirs", "local", "paper"],
+    );
+    refused(&["train", &bar, "-o", &at("no.sinew"), "--epochs", "0"], &["epochs"]);
+}
+
+#[test]
+fn choices_are_ablated_row_by_row_and_finished_rows_are_kept() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let at = |name: &str| path(folder.path(), name);
+    run(&[
+        "synthesize",
+        "bar",
+        "-o",
+        &at("bar"),
+        "--frames",
+        "9",
+        "--vertices",
+        "120",
+        "-q",
+    ]);
+    // The paper's rows would take a thousand steps: the groups here are of this recipe alone.
+    std::fs::write(at("small.toml"), SMALL).expect("a file in the temporary folder");
+    let (bar, config, work, json, report) = (at("bar"), at("small.toml"), at("rows"), at("all.json"), at("report"));
+    let ablate = |only: &str| {
+        run(&[
+            "ablate",
+            &bar,
+            "--train-every",
+            "3",
+            "--quick",
+            "--config",
+            &config,
+            "--only",
+            only,
+            "--work",
+            &work,
+            "--json",
+            &json,
+            "--report",
+            &report,
+            "-q",
+        ])
+    };
+    let table = ablate("attention,levels");
+    assert!(
+        table.contains("equal shares, separate") && table.contains("* attention, joint"),
+        "{table}"
+    );
+    let read = || -> serde_json::Value {
+        serde_json::from_str(&std::fs::read_to_string(&json).expect("figures were written")).expect("JSON")
+    };
+    let first = read();
+    let rows = first["rows"].as_array().expect("rows");
+    assert_eq!(rows.len(), 7);
+    for row in rows {
+        let figures = &row["outcome"]["measured"];
+        assert!(
+            figures["encoder"]["e_rms"].is_number() && figures["missed_training"].is_number(),
+            "{row}"
+        );
+    }
+    // The base stands in both groups and is trained once; the kept rows are the whole second run.
+    let kept = std::fs::read_dir(&work).expect("a folder of rows").count();
+    assert_eq!(kept, 6);
+    assert_eq!(ablate("attention,levels"), table);
+    assert_eq!(read(), first);
+    let page = std::fs::read_to_string(folder.path().join("report/index.html")).expect("a page");
+    assert!(page.contains("Attention and joint training") && page.contains("equal shares, joint"));
+    refused(&["ablate", &bar, "--only", "taste"], &["taste", "attention"]);
+}

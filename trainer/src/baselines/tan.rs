@@ -6,16 +6,14 @@
 //! One difference: where the paper fades sparsity in between two distances (0.2 and 0.4 of the longest), the network here
 //! knows one cut, set in their middle.
 
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-use sinew_formats::package::{AlignedBytes, FEATURE_COUNT, GraphConvRecord, Quality};
+use sinew_formats::package::{AlignedBytes, FEATURE_COUNT, Quality};
 
+use crate::components::random_start::random_start;
 use crate::config::TrainConfig;
 use crate::learn::package::package;
 use crate::learn::prepare::Prepared;
 use crate::learn::{LearnError, Reporter};
 use crate::network::loss::LossSettings;
-use crate::network::weights::StackWeights;
 use crate::training::data::ShapesSource;
 use crate::training::fit::{FitInput, FitProgress, FitSettings, Flow, StopReason, fit};
 
@@ -69,28 +67,6 @@ impl TanSettings {
     }
 }
 
-/// Random weights of Xavier's variance, one block of K latents.
-fn random_start(vertex_count: usize, settings: &TanSettings) -> StackWeights {
-    let mut random = ChaCha8Rng::seed_from_u64(settings.seed);
-    let mut uniform = |inputs: usize, outputs: usize| {
-        let bound = (6.0 / (inputs + outputs) as f32).sqrt();
-        random.random_range(-bound..bound)
-    };
-    let mut weights = StackWeights::zeros(vertex_count, &[settings.component_count]);
-    for block in weights.blocks_mut() {
-        for value in &mut block.components {
-            *value = uniform(vertex_count * FEATURE_COUNT, settings.component_count);
-        }
-        for convolution in [&mut block.encoder, &mut block.decoder] {
-            let GraphConvRecord { point, neighbour, .. } = convolution;
-            for value in point.as_flattened_mut().iter_mut().chain(neighbour.as_flattened_mut()) {
-                *value = uniform(FEATURE_COUNT, FEATURE_COUNT);
-            }
-        }
-    }
-    weights
-}
-
 /// Trains on the shapes of `prepared`, which was made with [`TanSettings::config`]. Returns a compact package, which the
 /// usual evaluation measures.
 /// Errors: a loss that keeps overflowing, the reporter's wish to stop.
@@ -125,7 +101,7 @@ pub fn train(
     };
     let outcome = fit(
         &input,
-        random_start(vertex_count, settings),
+        random_start(vertex_count, &[settings.component_count], settings.seed),
         &config.fit,
         &mut ShapesSource::new(shapes),
         // Nothing is held out: the last weights count.
@@ -187,6 +163,7 @@ mod tests {
                 sequence: &sequence,
                 test_shapes: &train_shapes[1..],
                 settings: config.features,
+                attention: config.fit.attention,
             };
             let (evaluation, _) = evaluate(&input, &|_| ()).expect("measures");
             (evaluation, bytes)

@@ -1,5 +1,6 @@
 //! The subcommands, one file each, and what they share: how they fail, how they read sequences and packages.
 
+pub mod ablate;
 pub mod bake;
 pub mod compare;
 pub mod console;
@@ -15,6 +16,7 @@ use std::path::Path;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use sinew_formats::interchange::{MeshSequence, read_sequence};
 use sinew_formats::package::{AlignedBytes, read_package};
+use sinew_trainer::config::{Recipe, TrainConfig};
 use sinew_trainer::learn::Reporter;
 
 use console::Console;
@@ -55,6 +57,21 @@ fn load_sequence(path: &Path, console: &Console) -> Result<MeshSequence, Report>
 /// Reads the bytes of a package file. The error names it.
 fn load_package(path: &Path) -> Result<AlignedBytes, Report> {
     read_package(path).into_diagnostic()
+}
+
+/// A recipe with what a file of settings changes.
+fn read_config(recipe: Recipe, path: Option<&Path>) -> Result<TrainConfig, Report> {
+    let Some(path) = path else {
+        return Ok(recipe.config());
+    };
+    let text = std::fs::read_to_string(path)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot read {}", path.display()))?;
+    recipe
+        .config()
+        .with_toml(&text)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("{} is not a usable configuration", path.display()))
 }
 
 /// The folder a file is to be written to must exist, so that hours of work do not end in a message.

@@ -6,11 +6,11 @@ use std::path::PathBuf;
 use clap::Args;
 use miette::{IntoDiagnostic, WrapErr, miette};
 use sinew_formats::package::save_package;
-use sinew_trainer::config::TrainConfig;
+use sinew_trainer::config::Recipe;
 use sinew_trainer::learn::{LearnError, RunOptions, learn};
 
 use super::console::Console;
-use super::{Failure, check_output, chosen_shapes, load_sequence, parse_duration};
+use super::{Failure, check_output, chosen_shapes, load_sequence, parse_duration, read_config};
 
 /// Arguments of `sinew train`.
 #[derive(Args)]
@@ -21,7 +21,8 @@ where it stopped, and ends with the same package as if it had never been stopped
 Examples:
   sinew train scans/ -o face.sinew
   sinew train walk/ -o walk.sinew --train-every 10 --time-budget 5m
-  sinew train flag/ -o flag.sinew --components 6,4,3"
+  sinew train flag/ -o flag.sinew --components 6,4,3
+  sinew train walk/ -o paper.sinew --train-every 10 --recipe paper --time-budget 1h"
 )]
 pub struct TrainArguments {
     /// Folder of meshes, or of positions.npy and faces.npy
@@ -38,6 +39,12 @@ pub struct TrainArguments {
     /// Components of each level, coarse to fine: 10,5 makes 10 coarse ones with 5 fine ones under each [default: 10,5]
     #[arg(long, value_name = "K[,K...]", value_delimiter = ',')]
     components: Option<Vec<usize>>,
+    /// Way to train; --config changes what its file names
+    #[arg(long, value_enum, value_name = "NAME", default_value_t = Recipe::Local)]
+    recipe: Recipe,
+    /// Steps of the optimiser, each on one batch: on all training shapes under --recipe paper [default: 300; paper: 10000]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    epochs: Option<u32>,
     /// Seed of every random choice [default: 0]
     #[arg(long, value_name = "NUMBER")]
     seed: Option<u64>,
@@ -57,19 +64,12 @@ pub struct TrainArguments {
 
 /// Runs `sinew train`.
 pub fn run(arguments: &TrainArguments, console: &Console) -> Result<(), Failure> {
-    let mut config = match &arguments.config {
-        None => TrainConfig::default(),
-        Some(path) => {
-            let text = std::fs::read_to_string(path)
-                .into_diagnostic()
-                .wrap_err_with(|| format!("cannot read {}", path.display()))?;
-            TrainConfig::from_toml(&text)
-                .into_diagnostic()
-                .wrap_err_with(|| format!("{} is not a usable configuration", path.display()))?
-        }
-    };
+    let mut config = read_config(arguments.recipe, arguments.config.as_deref())?;
     if let Some(components) = &arguments.components {
         config.components.clone_from(components);
+    }
+    if let Some(epochs) = arguments.epochs {
+        config.fit.steps = epochs as usize;
     }
     if let Some(seed) = arguments.seed {
         config.seed = seed;

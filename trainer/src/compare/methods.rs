@@ -334,6 +334,7 @@ impl Run<'_, '_> {
             sequence: bench.input.sequence,
             test_shapes: &bench.test_shapes,
             settings: bench.input.settings.config.features,
+            attention: bench.input.settings.config.fit.attention,
         };
         let (evaluation, shapes) = evaluate(&input, &|done| self.reporter.advance(done as u64, ""))?;
         self.round_trip = Some(evaluation.round_trip);

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use sinew_formats::interchange::RenderSurface;
 use sinew_formats::package::{BlockRecord, CompactBasis, ComponentRecord, NONE, Provenance, Quality, RenderMesh};
 
+use crate::network::attention::Attention;
 use crate::network::weights::StackWeights;
 
 /// When a component is kept, and which of its entries.
@@ -216,15 +217,25 @@ impl LearnedBasis {
     }
 
     /// Removes redundant components: `feature_changes` (package order) is each one's mean feature change over the vertices
-    /// it moves. A component stays while a child of its own stays, for its attention mask feeds that child. At least the
-    /// strongest component stays. Returns how many went.
-    pub fn prune(&mut self, feature_changes: &[f32], settings: &PruneSettings) -> usize {
+    /// it moves. A component stays while a child of its own stays, for its attention mask feeds that child; where shares
+    /// are equal, every component of a block that feeds others stays, for each is a share. At least the strongest
+    /// component stays. Returns how many went.
+    pub fn prune(&mut self, feature_changes: &[f32], settings: &PruneSettings, attention: Attention) -> usize {
         let before = feature_changes.len();
         let strongest = feature_changes.iter().copied().fold(0.0, f32::max);
+        let level_count = self
+            .components()
+            .map(|component| component.path.len())
+            .max()
+            .unwrap_or(0);
         let mut keep: Vec<(Vec<usize>, bool)> = self
             .components()
             .zip(feature_changes)
-            .map(|(component, &change)| (component.path.clone(), change >= settings.least_strength.min(strongest)))
+            .map(|(component, &change)| {
+                let is_share = attention == Attention::Equal && component.path.len() < level_count;
+                let stays = is_share || change >= settings.least_strength.min(strongest);
+                (component.path.clone(), stays)
+            })
             .collect();
         for i in (0..keep.len()).rev() {
             if keep[i].1 && keep[i].0.len() > 1 {

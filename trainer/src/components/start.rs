@@ -4,13 +4,15 @@
 
 use faer::{Mat, Side};
 use rayon::prelude::*;
-use sinew_formats::package::GraphConvRecord;
 
 use super::modes::WeightedSamples;
 use super::regions::{find_regions, soft_windows};
 use crate::mesh::topology::Topology;
-use crate::network::kernel::MASK_FLOOR;
-use crate::network::weights::{BlockWeights, LevelWeights, StackWeights};
+use crate::network::attention::Attention;
+use crate::network::weights::{BlockWeights, LevelWeights, StackWeights, zero_convolution};
+
+/// Eigenvalues of the rows' products below this are those of rows that depend on others, or are zero.
+const DEPENDENT: f64 = 1e-3;
 
 /// Weights below this share of the strongest are left out of the mode computations.
 const WINDOW_CUT: f32 = 1e-3;
@@ -25,6 +27,8 @@ pub struct StartInput<'a> {
     pub samples: &'a [f32],
     /// K of each level, coarse to fine; none is 0.
     pub component_counts: &'a [usize],
+    /// How residuals are shared out among the blocks below.
+    pub attention: Attention,
     /// How far a root component reaches from its centre, as a share of the longest distance; beyond, it is cut to zero.
     pub root_reach: f32,
     /// k-subspace rounds behind the first clustering.
@@ -64,24 +68,37 @@ pub fn closed_form_start(input: &StartInput<'_>, distances: &(dyn Fn(usize) -> V
 
     let mut levels = vec![LevelWeights {
         component_count: root_count,
-        blocks: vec![block(&rows)],
+        blocks: vec![block(&rows, 1.0)],
     }];
     let mut residuals = vec![input.samples.to_vec()];
     let mut parents = vec![rows];
+    // What the decoders of a level multiply by: where each block sees but a share of every vertex, so many times that.
+    let mut gain = 1.0;
     for &count in &input.component_counts[1..] {
+        let child_gain = match input.attention {
+            Attention::Components => 1.0,
+            Attention::Equal => parents[0].len() as f32,
+        };
         let mut blocks = Vec::new();
         let mut child_residuals = Vec::new();
         let mut child_rows = Vec::new();
         for (rows, residual) in parents.iter().zip(&residuals) {
-            let residual = block_residual(rows, residual);
-            let masks = attention_masks(rows, vertex_count);
-            let children: Vec<Vec<Vec<f32>>> = masks
-                .par_iter()
-                .map(|mask| windowed_modes(&residual, vertex_count, mask, count))
-                .collect();
+            let residual = block_residual(rows, residual, gain);
+            let masks = attention_masks(rows, vertex_count, input.attention);
+            let children: Vec<Vec<Vec<f32>>> = match input.attention {
+                Attention::Components => masks
+                    .par_iter()
+                    .map(|mask| windowed_modes(&residual, vertex_count, mask, count))
+                    .collect(),
+                // All see the same: they share out its modes.
+                Attention::Equal => {
+                    let modes = windowed_modes(&residual, vertex_count, &vec![1.0; vertex_count], count * masks.len());
+                    modes.chunks(count).map(<[_]>::to_vec).collect()
+                }
+            };
             let is_last = levels.len() + 1 == input.component_counts.len();
             for (mask, rows) in masks.iter().zip(children) {
-                blocks.push(block(&rows));
+                blocks.push(block(&rows, child_gain));
                 // The residuals of the last level feed nothing.
                 child_residuals.push(if is_last { Vec::new() } else { masked(&residual, mask) });
                 child_rows.push(rows);
@@ -91,24 +108,23 @@ pub fn closed_form_start(input: &StartInput<'_>, distances: &(dyn Fn(usize) -> V
             component_count: count,
             blocks,
         });
+        gain = child_gain;
         residuals = child_residuals;
         parents = child_rows;
     }
     StackWeights { vertex_count, levels }
 }
 
-/// Convolutions that pass values through (`W_point = I`), and the given rows as C.
-fn block(rows: &[Vec<f32>]) -> BlockWeights {
-    let mut point = [[0.0; 9]; 9];
-    (0..9).for_each(|c| point[c][c] = 1.0);
-    let conv = GraphConvRecord {
-        point,
-        neighbour: [[0.0; 9]; 9],
-        bias: [0.0; 9],
+/// Convolutions that pass values through (`W_point = I`, the decoder's times `gain`), and the given rows as C.
+fn block(rows: &[Vec<f32>], gain: f32) -> BlockWeights {
+    let convolution = |diagonal: f32| {
+        let mut convolution = zero_convolution();
+        (0..9).for_each(|c| convolution.point[c][c] = diagonal);
+        convolution
     };
     BlockWeights {
-        encoder: conv,
-        decoder: conv,
+        encoder: convolution(1.0),
+        decoder: convolution(gain),
         components: rows.concat(),
     }
 }
@@ -146,8 +162,8 @@ fn strongest_vertex(row: &[f32]) -> usize {
     best.1
 }
 
-/// Löwdin: the orthonormal rows nearest to the given ones, `(C C^T)^(-1/2) C`. Rows that depend on others are only scaled
-/// to unit length.
+/// Löwdin: the orthonormal rows nearest to the given ones, `(C C^T)^(-1/2) C`. Rows of zeros stay; what
+/// rows have beside others that they depend on is raised no further than to rows that nearly do.
 fn orthonormalise(rows: &mut Vec<Vec<f32>>) {
     for row in rows.iter_mut() {
         let length = row.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();
@@ -162,11 +178,10 @@ fn orthonormalise(rows: &mut Vec<Vec<f32>>) {
         return;
     };
     let (u, s) = (eigen.U(), eigen.S());
-    if s[0] < 1e-3 {
-        return;
-    }
     let root = Mat::<f64>::from_fn(count, count, |i, j| {
-        (0..count).map(|q| u[(i, q)] * u[(j, q)] / s[q].sqrt()).sum()
+        (0..count)
+            .map(|q| u[(i, q)] * u[(j, q)] / s[q].max(DEPENDENT).sqrt())
+            .sum()
     });
     let mixed: Vec<Vec<f32>> = (0..count)
         .map(|i| {
@@ -182,8 +197,8 @@ fn orthonormalise(rows: &mut Vec<Vec<f32>>) {
     *rows = mixed;
 }
 
-/// `x - y` of a block at its start, where the convolutions pass values through: `y = tanh(C^T C tanh(x))`.
-fn block_residual(rows: &[Vec<f32>], inputs: &[f32]) -> Vec<f32> {
+/// `x - y` of a block at its start, where the convolutions pass values through: `y = tanh(gain C^T C tanh(x))`.
+fn block_residual(rows: &[Vec<f32>], inputs: &[f32], gain: f32) -> Vec<f32> {
     let width = rows[0].len();
     let mut residual = inputs.to_vec();
     residual.par_chunks_mut(width).for_each(|x| {
@@ -195,7 +210,7 @@ fn block_residual(rows: &[Vec<f32>], inputs: &[f32]) -> Vec<f32> {
                 .filter(|(c, _)| **c != 0.0)
                 .map(|(c, x)| c * x.tanh())
                 .sum();
-            decoded.iter_mut().zip(row).for_each(|(y, c)| *y += z * c);
+            decoded.iter_mut().zip(row).for_each(|(y, c)| *y += gain * z * c);
         }
         x.iter_mut().zip(&decoded).for_each(|(x, y)| *x -= y.tanh());
     });
@@ -203,8 +218,11 @@ fn block_residual(rows: &[Vec<f32>], inputs: &[f32]) -> Vec<f32> {
 }
 
 /// Attention masks of a block's components (method section 2). Shape: `[K][V]`; they sum to one at every vertex.
-fn attention_masks(rows: &[Vec<f32>], vertex_count: usize) -> Vec<Vec<f32>> {
-    let floor = MASK_FLOOR / vertex_count as f32;
+fn attention_masks(rows: &[Vec<f32>], vertex_count: usize, attention: Attention) -> Vec<Vec<f32>> {
+    let floor = attention.floor(vertex_count);
+    if floor.is_infinite() {
+        return vec![vec![1.0 / rows.len() as f32; vertex_count]; rows.len()];
+    }
     let energy = |row: &[f32], v: usize| row[9 * v..9 * v + 9].iter().map(|x| x * x).sum::<f32>() + floor;
     let totals: Vec<f32> = (0..vertex_count)
         .map(|v| rows.iter().map(|row| energy(row, v)).sum())

@@ -6,6 +6,7 @@ use sinew_formats::package::{BlockRecord, CompactView, FEATURE_COUNT, GraphConvR
 use crate::{
     bake::sparse::{SparseComponent, unpack_components},
     mesh::topology::Topology,
+    network::attention::Attention,
 };
 
 /// Added to every component's energy at a vertex before masks are normalised, times `1 / V`: where no component of a block
@@ -39,8 +40,8 @@ pub struct Encoding {
 }
 
 impl<'t> StackEncoder<'t> {
-    /// Prepares the masks. `topology` is that of the package ([`crate::bake::Surface`]).
-    pub fn new(package: &CompactView<'_>, topology: &'t Topology) -> Self {
+    /// Prepares the masks. `topology` is that of the package ([`crate::bake::Surface`]); `attention` that of its training.
+    pub fn new(package: &CompactView<'_>, topology: &'t Topology, attention: Attention) -> Self {
         let blocks: Vec<BlockRecord> = package.blocks().collect();
         let components = unpack_components(package);
         let mut masks = vec![Vec::new(); components.len()];
@@ -48,7 +49,12 @@ impl<'t> StackEncoder<'t> {
             let members = component_range(block);
             let has_child = |k: usize| blocks.iter().any(|child| child.parent_component == k as u32);
             if members.clone().any(has_child) {
-                let block_masks = attention_masks(topology.vertex_count, &components[members.clone()]);
+                let block_masks = match attention {
+                    Attention::Components => attention_masks(topology.vertex_count, &components[members.clone()]),
+                    Attention::Equal => {
+                        vec![vec![1.0 / members.len() as f64; topology.vertex_count]; members.len()]
+                    }
+                };
                 for (k, mask) in members.zip(block_masks) {
                     masks[k] = mask;
                 }

@@ -25,6 +25,7 @@ use crate::{
         scaler::FeatureScaler,
     },
     mesh::sparse_factor::FactorError,
+    network::attention::Attention,
 };
 
 /// What is measured, and on what.
@@ -38,6 +39,8 @@ pub struct EvaluationInput<'a> {
     pub test_shapes: &'a [usize],
     /// Settings of the features, those of the training.
     pub settings: FeatureSettings,
+    /// How the network shared residuals out, as in the training.
+    pub attention: Attention,
 }
 
 /// The figures, as `sinew evaluate --json` prints them.
@@ -170,7 +173,7 @@ pub fn evaluate(
     let bench = Bench::new(&package, &baked)?;
     let surface = &bench.surface;
     let fit = GradientFit::new(&surface.topology, &surface.rest, &input.settings);
-    let encoder = StackEncoder::new(&package, &surface.topology);
+    let encoder = StackEncoder::new(&package, &surface.topology, input.attention);
     let projection = bench.projection();
     let done = AtomicUsize::new(0);
     let results: Vec<ShapeResult> = input

@@ -10,6 +10,7 @@ use super::*;
 use crate::{
     bake::{Surface, bake_bytes, fixture},
     features::{align::widened, gradient::FeatureSettings, reconstruct::PoissonSystem},
+    network::attention::Attention,
 };
 
 const WEIGHTS: [f64; 7] = [0.8, -0.5, 1.0, 0.3, -0.9, 0.6, 0.4];
@@ -96,6 +97,7 @@ fn evaluation_ranks_the_three_ways_and_names_its_fields() {
         sequence: &sequence,
         test_shapes: &[1, 2],
         settings: FeatureSettings::default(),
+        attention: Attention::default(),
     };
     let (evaluation, reconstructions) = evaluate(&input, &|_| ()).unwrap();
     assert_eq!((evaluation.shapes, evaluation.vertices), (2, fixture::mesh().0.len()));
@@ -229,7 +231,7 @@ fn encoder_agrees_with_a_dense_one() {
             .zip(&left)
             .for_each(|((total, x), r)| *total -= x - r);
     }
-    let encoding = StackEncoder::new(&package, &surface.topology).encode(&features);
+    let encoding = StackEncoder::new(&package, &surface.topology, Attention::default()).encode(&features);
     assert!(
         largest_difference(&encoding.weights, &weights) < 1e-9,
         "{:?} {weights:?}",

@@ -11,6 +11,7 @@ use crate::bake::{Surface, bake};
 use crate::components::extract::LearnedBasis;
 use crate::config::{TrainConfig, ValidationSettings};
 use crate::evaluate::{NormalisedPair, StackEncoder};
+use crate::network::attention::Attention;
 use crate::network::weights::StackWeights;
 use crate::training::fit::HistoryPoint;
 
@@ -54,7 +55,7 @@ impl HeldOut {
         let basis = draft(prepared, config, weights, &self.rest_of(prepared.network.len()))?;
         let inputs: Vec<&[[f32; 9]]> = self.shapes.iter().map(|&m| prepared.network[m].as_slice()).collect();
         let truth = self.shapes.iter().map(|&m| prepared.aligned[m].clone()).collect();
-        Ok(encoder_error(&basis, &inputs, Some(truth))?)
+        Ok(encoder_error(&basis, config.fit.attention, &inputs, Some(truth))?)
     }
 }
 
@@ -62,6 +63,7 @@ impl HeldOut {
 /// positions by the solve alone.
 pub fn encoder_error(
     basis: &LearnedBasis,
+    attention: Attention,
     inputs: &[&[[f32; 9]]],
     truth: Option<Vec<Vec<[f32; 3]>>>,
 ) -> Result<f32, PackageError> {
@@ -70,7 +72,7 @@ pub fn encoder_error(
     let baked = bake(&view)?;
     let opened = Basis::open(&baked)?;
     let surface = Surface::of_package(&view);
-    let encoder = StackEncoder::new(&view, &surface.topology);
+    let encoder = StackEncoder::new(&view, &surface.topology, attention);
     let codes: Vec<Vec<f64>> = inputs.par_iter().map(|shape| encoder.encode(shape).weights).collect();
     let played = with_players(&opened, &codes, |player, code| Ok(player.play(code)?.to_vec()))?;
     let truth = match truth {

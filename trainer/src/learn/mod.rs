@@ -1,14 +1,15 @@
 //! The whole training job: from a sequence to a compact package. Everything the command does between reading files and
 //! writing one is here, so that tests and other programs can do it too.
 //!
-//! Path of data: [`prepare`] (topology, features, distances) -> choose how to mix and where to start, by held-out shapes
-//! ([`hold_out`]) -> fit, and fit again on all shapes where they are few -> [`refine`] for positions -> [`package`] (extract,
-//! prune, measure).
+//! Path of data: [`review`] (which shapes are of use) -> [`prepare`] (topology, features, distances) -> choose how to mix and
+//! where to start, by held-out shapes ([`hold_out`]) -> fit, and fit again on all shapes where they are few -> [`refine`] for
+//! positions -> [`package`] (extract, prune, measure).
 
 pub mod hold_out;
 pub mod package;
 pub mod prepare;
 pub mod refine;
+pub mod review;
 pub mod run_folder;
 mod stages;
 
@@ -28,6 +29,7 @@ use crate::training::fit::{FitOutcome, HistoryPoint, TrainingError};
 use hold_out::HeldOut;
 use package::PackageError;
 use prepare::Prepared;
+use review::review;
 use run_folder::{Plan, RunFolder, RunFolderError};
 use stages::{Fit, FitBounds, choose, in_words, run_fit};
 
@@ -105,6 +107,14 @@ pub enum LearnError {
         /// What is needed.
         needed: usize,
     },
+    /// A coordinate is NaN or infinite.
+    #[error("vertex {vertex} of {shape} is at no finite place: mend the shape, or leave it out with --train-list")]
+    NotFinite {
+        /// Number and name of the shape.
+        shape: String,
+        /// Its first such vertex.
+        vertex: usize,
+    },
     /// All training shapes equal the reference.
     #[error("no vertex moves in any of the {shapes} training shapes: there is nothing to learn")]
     NothingMoves {
@@ -154,7 +164,9 @@ pub fn learn(
 ) -> Result<Learned, LearnError> {
     keep_linear_algebra_serial();
     let started = Instant::now();
-    let prepared = Prepared::new(sequence, train_shapes, config, reporter)?;
+    let reviewed = review(sequence, train_shapes, config.component_count())?;
+    reviewed.notices.iter().for_each(|notice| reporter.notice(notice));
+    let prepared = Prepared::new(sequence, &reviewed.shapes, config, reporter)?;
     let mut folder = RunFolder::open(options.work_folder.as_deref(), &prepared.fingerprint(config))?;
     let held_out = HeldOut::choose(&prepared, &config.validation);
     let fit_shapes = held_out.rest_of(prepared.network.len());

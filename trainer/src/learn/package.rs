@@ -116,7 +116,7 @@ pub fn package(
     let mut basis = draft(prepared, config, weights, &all)?;
     measure_ranges(&mut basis, prepared, config, &all)?;
     let changes = measure_strengths(&mut basis, config)?;
-    let removed_count = basis.prune(&changes, &config.prune);
+    let removed_count = basis.prune(&changes, &config.prune, config.fit.attention);
     basis.order_by_strength();
     // Masks are shared among the components that are left, so the weights of the rest have moved a little.
     measure_ranges(&mut basis, prepared, config, &all)?;
@@ -151,7 +151,7 @@ fn measure_ranges(
     let compact = basis.write_draft()?;
     let view = compact.view()?;
     let surface = Surface::of_package(&view);
-    let encoder = StackEncoder::new(&view, &surface.topology);
+    let encoder = StackEncoder::new(&view, &surface.topology, config.fit.attention);
     let mixes = match config.mixes.per_step {
         0 => Vec::new(),
         _ => mixer(prepared, shapes, &config.mixes, config.seed).mixes(NUMBER_OF_RANGE_MIXES, RANGE_MIXES),

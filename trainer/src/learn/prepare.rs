@@ -72,7 +72,7 @@ impl Prepared {
             .into_iter()
             .map(|shape| shape.positions)
             .collect();
-        if !anything_moves(&rest, &aligned) {
+        if !aligned.iter().any(|shape| moves(&rest, shape)) {
             return Err(LearnError::NothingMoves { shapes: shapes.len() });
         }
         let features = AcapFeatures::compute(&topology, &rest, &aligned, &config.features, &|done| {
@@ -178,17 +178,16 @@ fn narrowed(values: Vec<f64>) -> Vec<f32> {
     values.into_iter().map(|x| x as f32).collect()
 }
 
-fn anything_moves(rest: &[[f64; 3]], shapes: &[Vec<[f64; 3]>]) -> bool {
+/// Whether an aligned shape differs from the reference.
+pub(super) fn moves(rest: &[[f64; 3]], shape: &[[f64; 3]]) -> bool {
     let extent = (0..3)
         .map(|c| {
             let values = rest.iter().map(|p| p[c]);
             values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)
         })
         .fold(0.0, f64::max);
-    shapes.iter().any(|shape| {
-        shape
-            .iter()
-            .zip(rest)
-            .any(|(p, r)| (0..3).any(|c| (p[c] - r[c]).abs() > STILL * extent))
-    })
+    shape
+        .iter()
+        .zip(rest)
+        .any(|(p, r)| (0..3).any(|c| (p[c] - r[c]).abs() > STILL * extent))
 }

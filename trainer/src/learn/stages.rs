@@ -8,8 +8,9 @@ use super::prepare::Prepared;
 use super::run_folder::{Plan, RunFolder};
 use super::{LearnError, Reporter, package};
 use crate::components::mix::{MixSettings, Mixer};
+use crate::components::random_start::random_start;
 use crate::components::start::{StartInput, closed_form_start};
-use crate::config::TrainConfig;
+use crate::config::{StartKind, TrainConfig};
 use crate::network::weights::StackWeights;
 use crate::training::data::{BatchSource, ShapesSource};
 use crate::training::fit::{FitInput, FitOutcome, FitProgress, FitSettings, Flow, StopReason, fit};
@@ -43,7 +44,7 @@ const START_MIXES: u64 = 1 << 40;
 /// Number of the first mix that seeds are chosen by, and how many.
 const SEED_MIXES: (u64, usize) = (1 << 42, 12);
 
-/// The closed-form start, its faint parts cut: of `seed_count` seeds the one that plays unseen mixes best.
+/// The start. The closed form's faint parts are cut, and of `seed_count` seeds it is the one that plays unseen mixes best.
 fn start(
     prepared: &Prepared,
     config: &TrainConfig,
@@ -52,6 +53,9 @@ fn start(
     seed_count: usize,
     reporter: &dyn Reporter,
 ) -> Result<StackWeights, LearnError> {
+    if config.start.kind == StartKind::Random {
+        return Ok(random_start(prepared.rest.len(), &config.components, config.seed));
+    }
     let unseen = mixer(prepared, shapes, mixes, config.seed).mixes(SEED_MIXES.0, SEED_MIXES.1);
     let unseen: Vec<&[[f32; 9]]> = unseen.as_chunks::<9>().0.chunks(prepared.rest.len()).collect();
     let mut best: Option<(f32, StackWeights)> = None;
@@ -64,7 +68,7 @@ fn start(
             return Ok(weights);
         }
         let basis = package::draft(prepared, config, &weights, shapes)?;
-        let error = encoder_error(&basis, &unseen, None)?;
+        let error = encoder_error(&basis, config.fit.attention, &unseen, None)?;
         if best.as_ref().is_none_or(|(least, _)| error < *least) {
             best = Some((error, weights));
         }
@@ -86,6 +90,7 @@ fn start_of_seed(
         rest: &prepared.rest,
         samples: &samples,
         component_counts: &config.components,
+        attention: config.fit.attention,
         root_reach: config.start.root_reach,
         rounds: config.start.rounds,
         seed,
@@ -118,7 +123,8 @@ pub(super) fn choose(
         mixes: config.mixes.clone(),
         first_fit: None,
     };
-    if held_out.is_empty() || config.mixes.per_step == 0 {
+    // A random start says nothing of the mixes.
+    if held_out.is_empty() || config.mixes.per_step == 0 || config.start.kind == StartKind::Random {
         return Ok(best);
     }
     let mut candidates: Vec<MixSettings> = config
@@ -202,29 +208,46 @@ pub(super) fn run_fit(
         ..config.fit.clone()
     };
     reporter.stage(bounds.name, bounds.steps as u64);
+    let checkpoint = folder.file(bounds.file);
     let mut failure = None;
+    let mut measured = checkpoint.as_ref().is_some_and(|path| path.exists());
     let mut validate = |weights: &StackWeights| {
         if held_out.is_empty() {
             return f32::NAN;
         }
-        held_out.error(prepared, config, weights).unwrap_or_else(|error| {
-            failure = Some(error);
-            f32::NAN
-        })
+        match held_out.error(prepared, config, weights) {
+            Ok(error) => {
+                measured = true;
+                error
+            }
+            // Weights gone wild make no package; those before them did.
+            Err(LearnError::Package(_)) if measured => f32::NAN,
+            Err(error) => {
+                failure = Some(error);
+                f32::NAN
+            }
+        }
     };
+    let mut rollbacks = 0;
     let mut observe = |progress: &FitProgress| {
         let mut note = format!("loss {:.4}", progress.loss.sum());
         if let Some(best) = progress.best {
             note += &format!(", held-out E_rms {best:.2}");
         }
         reporter.advance(progress.step as u64, &note);
+        if progress.rollbacks > rollbacks {
+            rollbacks = progress.rollbacks;
+            reporter.notice(&format!(
+                "step {}: the loss is no longer a number; back to the best weights so far, at half the learning rate",
+                progress.step
+            ));
+        }
         if reporter.stop_requested() || progress.step >= bounds.steps {
             Flow::Stop
         } else {
             Flow::Continue
         }
     };
-    let checkpoint = folder.file(bounds.file);
     let outcome = fit(
         &input,
         weights,

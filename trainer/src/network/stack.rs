@@ -8,8 +8,8 @@ use burn::module::{Module, Param};
 use burn::tensor::{Device, IndexingUpdateOp, Int, Tensor, TensorData};
 use sinew_formats::package::FEATURE_COUNT;
 
+use super::attention::Attention;
 use super::device::training_device;
-use super::kernel::MASK_FLOOR;
 use super::loss::{LossSettings, LossTerms, NORM_SOFTENING};
 use super::ring::RingMean;
 use super::weights::{LevelWeights, StackWeights};
@@ -55,6 +55,7 @@ struct Answer {
 pub struct DifferentiableStack {
     device: Device,
     mean: TensorMean,
+    attention: Attention,
     /// Shape: `[1, 1, V, 1]`.
     vertex_weights: Tensor<4>,
     /// Shape: `[V 9, I]`, absent without modes.
@@ -63,13 +64,14 @@ pub struct DifferentiableStack {
 
 impl DifferentiableStack {
     /// As [`super::kernel::Kernel::new`].
-    pub fn new(ring: &RingMean, vertex_weights: &[f32], modes: &[f32]) -> Self {
+    pub fn new(ring: &RingMean, vertex_weights: &[f32], modes: &[f32], attention: Attention) -> Self {
         let device = training_device().autodiff();
         let vertex_count = ring.vertex_count();
         let len = vertex_count * FEATURE_COUNT;
         let mode_count = modes.len() / len;
         Self {
             mean: TensorMean::new(ring, &device),
+            attention,
             vertex_weights: tensor(vertex_weights, [1, 1, vertex_count, 1], &device),
             modes: (mode_count > 0).then(|| tensor(modes, [mode_count, len], &device).transpose()),
             device,
@@ -97,7 +99,7 @@ impl DifferentiableStack {
             block_error = block_error + self.squared_norm(residual.clone());
             error = error - answer.output.sum_dim(0);
             range = range + range_excess(answer.latents, settings);
-            input = level.attend(residual);
+            input = level.attend(residual, self.attention);
         }
         let per_shape = settings.reconstruction_weight / shape_count as f32;
         let position = match &self.modes {
@@ -286,12 +288,17 @@ impl Autoencoders {
     }
 
     /// What the blocks below see of a residual `[B, N, V, 9]`: `[B K, N, V, 9]`.
-    fn attend(&self, residual: Tensor<4>) -> Tensor<4> {
+    fn attend(&self, residual: Tensor<4>, attention: Attention) -> Tensor<4> {
         let energy = self.components.val().square().sum_dim(3);
         let [block_count, k_count, vertex_count, _] = energy.dims();
         let shape_count = residual.dims()[1];
-        let raised = energy.add_scalar(MASK_FLOOR / vertex_count as f32);
-        let masks: Tensor<4> = raised.clone() / raised.sum_dim(1);
+        let masks: Tensor<4> = match attention {
+            Attention::Components => {
+                let raised = energy.add_scalar(attention.floor(vertex_count));
+                raised.clone() / raised.sum_dim(1)
+            }
+            Attention::Equal => energy.zeros_like().add_scalar(1.0 / k_count as f32),
+        };
         let len = [block_count, 1, shape_count, vertex_count, FEATURE_COUNT];
         let product = residual.reshape(len) * masks.reshape([block_count, k_count, 1, vertex_count, 1]);
         product.reshape([block_count * k_count, shape_count, vertex_count, FEATURE_COUNT])

@@ -3,6 +3,7 @@
 //! `positions + faces + values -> view -> raster -> Image -> pictures -> html`. All of it is drawn on the CPU and ends in one
 //! self-contained file; the same input gives the same bytes.
 
+pub mod ablation_page;
 pub mod color;
 pub mod compare_page;
 pub mod html;

@@ -1,4 +1,4 @@
-//! The training loop: every block of the stack jointly, with validation, early stopping, rollback and exact resume.
+//! The training loop: every block of the stack jointly, or level by level; with validation, early stopping, rollback and exact resume.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -9,9 +9,11 @@ use sinew_formats::package::FEATURE_COUNT;
 use super::checkpoint;
 use super::data::BatchSource;
 use super::optimizer::Stepper;
+use super::schedule::Stage;
 pub use super::terms::{
     Engine, FitInput, FitOutcome, FitProgress, FitSettings, Flow, HistoryPoint, StopReason, TrainingError,
 };
+use crate::network::attention::Attention;
 use crate::network::kernel::Kernel;
 use crate::network::loss::{LossSettings, LossTerms, SparsityRegions};
 use crate::network::ring::RingMean;
@@ -67,7 +69,7 @@ pub fn fit(
     let supports = settings.keep_supports.then_some(supports);
     let first_step = state.step;
     let mut run = Run {
-        network: Network::new(settings.engine, input),
+        network: Network::new(settings.engine, settings.attention, input),
         regions: SparsityRegions::new(input.distances),
         supports,
         settings,
@@ -192,12 +194,13 @@ enum Network {
 }
 
 impl Network {
-    fn new(engine: Engine, input: &FitInput<'_>) -> Self {
+    fn new(engine: Engine, attention: Attention, input: &FitInput<'_>) -> Self {
         let ring = RingMean::new(input.topology);
+        let (vertex_weights, modes) = (input.vertex_weights, input.position_modes);
         match engine {
-            Engine::Kernel => Self::Kernel(Box::new(Kernel::new(ring, input.vertex_weights, input.position_modes))),
+            Engine::Kernel => Self::Kernel(Box::new(Kernel::new(ring, vertex_weights, modes, attention))),
             Engine::Tensors => {
-                let model = DifferentiableStack::new(&ring, input.vertex_weights, input.position_modes);
+                let model = DifferentiableStack::new(&ring, vertex_weights, modes, attention);
                 Self::Tensors(Box::new(model))
             }
         }
@@ -239,9 +242,10 @@ impl Run<'_> {
     ) -> Result<StopReason, TrainingError> {
         let earlier_seconds = self.state.seconds;
         let patience = self.settings.patience;
-        let exhausted = |state: &FitState| patience > 0 && state.stale >= patience;
         let stop_reason = loop {
-            if exhausted(&self.state) {
+            let stage = self.enter_stage();
+            let last_level = stage.levels.end == self.state.weights.levels.len();
+            if last_level && patience > 0 && self.state.stale >= patience {
                 break StopReason::NoImprovement;
             }
             if self.state.step >= self.settings.steps {
@@ -256,7 +260,7 @@ impl Run<'_> {
             }
             let step = self.state.step;
             let batch = batches.recv().map_err(|_| TrainingError::NoBatch { step })?;
-            let loss = self.step(&batch)?;
+            let loss = self.step(&batch, &stage)?;
             let validation = self.validate(validate);
             self.state.seconds = earlier_seconds + self.begun.elapsed().as_secs_f64();
             self.state.history.push(HistoryPoint {
@@ -284,8 +288,22 @@ impl Run<'_> {
         Ok(stop_reason)
     }
 
+    /// The stage of the next step; the optimiser forgets what it knew of another stage.
+    fn enter_stage(&mut self) -> Stage {
+        let (step, step_count) = (self.state.step, self.settings.steps);
+        let stage = self
+            .settings
+            .schedule
+            .stage(step, step_count, self.state.weights.levels.len());
+        if step == stage.steps.start && step > 0 {
+            self.stepper = Stepper::new();
+            self.state.stale = 0;
+        }
+        stage
+    }
+
     /// One step, or a return to the best weights where the loss or its gradient is not finite.
-    fn step(&mut self, batch: &[f32]) -> Result<LossTerms, TrainingError> {
+    fn step(&mut self, batch: &[f32], stage: &Stage) -> Result<LossTerms, TrainingError> {
         let (settings, state) = (self.settings, &mut self.state);
         let shape_len = state.weights.vertex_count * FEATURE_COUNT;
         if batch.is_empty() || !batch.len().is_multiple_of(shape_len) {
@@ -295,15 +313,19 @@ impl Run<'_> {
                 shape_len,
             });
         }
+        let partial = (stage.levels.len() < state.weights.levels.len()).then(|| stage.network(&state.weights));
+        let weights = partial.as_ref().unwrap_or(&state.weights);
         let outside = match settings.loss.sparsity_weight {
             0.0 => Vec::new(),
-            _ => self.regions.outside(&state.weights, &settings.loss),
+            _ => self.regions.outside(weights, &settings.loss),
         };
-        let (loss, gradient) = self
-            .network
-            .differentiate(&state.weights, batch, &outside, &settings.loss);
-        let progress = state.step as f32 / settings.steps as f32;
-        let warmth = ((state.step + 1) as f32 / settings.warm_up.max(1) as f32).min(1.0);
+        let (loss, mut gradient) = self.network.differentiate(weights, batch, &outside, &settings.loss);
+        if partial.is_some() {
+            gradient = stage.complete(gradient, &state.weights);
+        }
+        let done = state.step - stage.steps.start;
+        let progress = done as f32 / stage.steps.len() as f32;
+        let warmth = ((done + 1) as f32 / settings.warm_up.max(1) as f32).min(1.0);
         let rate = f64::from(self.rate * state.rate_scale * warmth * settings.final_share.powf(progress));
         let mut sound = loss.sum().is_finite() && gradient.is_finite();
         if sound {

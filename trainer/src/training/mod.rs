@@ -4,6 +4,7 @@ pub mod checkpoint;
 pub mod data;
 pub mod fit;
 mod optimizer;
+pub mod schedule;
 mod terms;
 #[cfg(test)]
 mod tests;

@@ -4,7 +4,9 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::checkpoint::CheckpointError;
+use super::schedule::Schedule;
 use crate::mesh::topology::Topology;
+use crate::network::attention::Attention;
 use crate::network::loss::{LossSettings, LossTerms};
 use crate::network::weights::StackWeights;
 
@@ -49,6 +51,10 @@ pub struct FitSettings {
     pub checkpoint_every: usize,
     /// What computes loss and gradients.
     pub engine: Engine,
+    /// Which levels train when.
+    pub schedule: Schedule,
+    /// How residuals are shared out among the blocks below.
+    pub attention: Attention,
     /// What to minimise.
     pub loss: LossSettings,
 }
@@ -68,6 +74,8 @@ impl Default for FitSettings {
             time_budget_s: None,
             checkpoint_every: 50,
             engine: Engine::Kernel,
+            schedule: Schedule::Joint,
+            attention: Attention::Components,
             loss: LossSettings::local(),
         }
     }

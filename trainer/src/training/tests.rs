@@ -9,6 +9,7 @@ use sinew_formats::package::FEATURE_COUNT;
 
 use super::data::{BatchSource, ShapesSource};
 use super::fit::{Engine, FitInput, FitOutcome, FitSettings, Flow, StopReason, TrainingError, fit};
+use super::schedule::Schedule;
 use crate::mesh::topology::{Topology, TopologyFindings};
 use crate::network::weights::StackWeights;
 
@@ -140,6 +141,51 @@ fn training_lowers_the_loss() {
         loss(0..10),
         loss(140..150)
     );
+}
+
+#[test]
+fn levels_train_one_after_the_other_where_asked() {
+    let settings = FitSettings {
+        schedule: Schedule::LevelByLevel,
+        keep_supports: false,
+        ..settings(8)
+    };
+    let begun = {
+        let mut start = start();
+        start.normalize_rows();
+        start
+    };
+    let half = train(&settings, &mut Bumps, &mut |_| f32::NAN, Some(4), None).unwrap();
+    let whole = train(&settings, &mut Bumps, &mut |_| f32::NAN, None, None).unwrap();
+    let change = |a: &StackWeights, b: &StackWeights, l: usize| -> f32 {
+        let rows = |weights: &StackWeights| {
+            weights.levels[l]
+                .blocks
+                .iter()
+                .flat_map(|block| block.components.clone())
+                .collect::<Vec<_>>()
+        };
+        rows(a)
+            .iter()
+            .zip(rows(b))
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f32::max)
+    };
+    // A row of unit length is scaled to unit length again after every step.
+    let still = 1e-6;
+    assert!(change(&begun, &half.weights, 0) > 1e-5 && change(&begun, &half.weights, 1) < still);
+    assert!(change(&half.weights, &whole.weights, 0) < still && change(&half.weights, &whole.weights, 1) > 1e-5);
+
+    // Stopped within the second level and resumed, it is the same fit.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("fit.checkpoint");
+    for stop_at in [Some(4), Some(6), None] {
+        let part = train(&settings, &mut Bumps, &mut |_| f32::NAN, stop_at, Some(&path)).unwrap();
+        if stop_at.is_none() {
+            assert_eq!(part.history, whole.history);
+            assert_eq!(part.weights, whole.weights);
+        }
+    }
 }
 
 #[test]

@@ -39,6 +39,8 @@ pub struct TopologyFindings {
     pub boundary_edge_count: usize,
     /// Edges with more than two faces.
     pub non_manifold_edge_count: usize,
+    /// Vertices where faces meet that are not joined along edges around them.
+    pub non_manifold_vertex_count: usize,
     /// Vertices that share their rest position with an earlier one.
     pub duplicate_vertex_count: usize,
     /// Faces of zero area at rest.
@@ -72,6 +74,7 @@ impl Topology {
         let mut findings = TopologyFindings {
             duplicate_vertex_count: duplicate_vertex_count(rest),
             zero_area_face_count: faces.iter().filter(|face| is_flat(face, rest)).count(),
+            non_manifold_vertex_count: non_manifold_vertex_count(faces),
             ..TopologyFindings::default()
         };
         let mut edges: Vec<[u32; 2]> = Vec::with_capacity(half_edges.len() / 2);
@@ -222,6 +225,28 @@ fn duplicate_vertex_count(rest: &[[f64; 3]]) -> usize {
     sorted.windows(2).filter(|pair| pair[0] == pair[1]).count()
 }
 
+/// Vertices whose faces fall apart when only joined along the edges at the vertex.
+fn non_manifold_vertex_count(faces: &[[u32; 3]]) -> usize {
+    let mut corners: Vec<[u32; 3]> = faces
+        .iter()
+        .filter(|face| !names_a_vertex_twice(face))
+        .flat_map(|&[a, b, c]| [[a, b, c], [b, c, a], [c, a, b]])
+        .collect();
+    corners.sort_unstable();
+    let falls_apart = |fan: &[[u32; 3]]| {
+        let mut around: Vec<u32> = fan.iter().flat_map(|&[_, b, c]| [b, c]).collect();
+        around.sort_unstable();
+        around.dedup();
+        let place = |v: &u32| around.partition_point(|other| other < v);
+        let joints: Vec<[u32; 2]> = fan.iter().map(|[_, b, c]| [place(b) as u32, place(c) as u32]).collect();
+        label_pieces(around.len(), &joints).1 > 1
+    };
+    corners
+        .chunk_by(|a, b| a[0] == b[0])
+        .filter(|fan| falls_apart(fan))
+        .count()
+}
+
 /// Piece of each vertex (`None` for one without edges), numbered in order of their first vertex, and how many there are.
 fn label_pieces(vertex_count: usize, edges: &[[u32; 2]]) -> (Vec<Option<u32>>, usize) {
     let (offsets, ring) = compressed_rings(vertex_count, edges);
@@ -339,10 +364,23 @@ mod tests {
         let faces = [[0, 1, 2], [0, 1, 3], [0, 1, 4], [0, 1, 5], [2, 2, 3]];
         let findings = Topology::new(&faces, &rest).findings;
         assert_eq!(findings.non_manifold_edge_count, 1);
+        assert_eq!(findings.non_manifold_vertex_count, 0);
         assert_eq!(findings.zero_area_face_count, 2);
         assert_eq!(findings.duplicate_vertex_count, 1);
         assert_eq!(findings.isolated_vertex_count, 1);
         assert_eq!(findings.piece_count, 1);
+    }
+
+    #[test]
+    fn surfaces_that_meet_in_a_point_are_counted() {
+        let (mut rest, mut faces) = grid(2, 2, 1.0);
+        assert_eq!(Topology::new(&faces, &rest).findings.non_manifold_vertex_count, 0);
+        let corner = 0;
+        let next = rest.len() as u32;
+        rest.extend([[-1.0, 0.0, 1.0], [0.0, -1.0, 1.0]]);
+        faces.push([corner, next, next + 1]);
+        let findings = Topology::new(&faces, &rest).findings;
+        assert_eq!((findings.non_manifold_vertex_count, findings.piece_count), (1, 1));
     }
 
     #[test]

@@ -18,6 +18,7 @@ use sinew_formats::package::FEATURE_COUNT;
 use self::backward::{ConvolutionSums, ResidualGradient};
 use self::lanes::{Features, LANE_COUNT, Lane, ZERO_FEATURES, ZERO_LANE};
 use self::state::{BlockState, shapes_from_lanes, shapes_into_lanes};
+use super::attention::Attention;
 use super::loss::{LossSettings, LossTerms, sparsity};
 use super::ring::RingMean;
 use super::weights::StackWeights;
@@ -32,6 +33,7 @@ pub const MASK_FLOOR: f32 = 1e-6;
 pub struct Kernel {
     ring: RingMean,
     vertex_weights: Vec<f32>,
+    attention: Attention,
     /// Modes transposed. Shape: `[V][9][I]`.
     modes: Vec<f32>,
     mode_count: usize,
@@ -51,7 +53,7 @@ pub struct StackOutput {
 impl Kernel {
     /// `vertex_weights`: shape `[V]`, areas with mean one. `modes`: the g_i of the position term, shape `[I][V][9]`, or
     /// empty. Both must fit the ring's V.
-    pub fn new(ring: RingMean, vertex_weights: &[f32], modes: &[f32]) -> Self {
+    pub fn new(ring: RingMean, vertex_weights: &[f32], modes: &[f32], attention: Attention) -> Self {
         let len = ring.vertex_count() * FEATURE_COUNT;
         let mode_count = modes.len() / len;
         let mut transposed = vec![0.0; mode_count * len];
@@ -63,6 +65,7 @@ impl Kernel {
         Self {
             ring,
             vertex_weights: vertex_weights.to_vec(),
+            attention,
             modes: transposed,
             mode_count,
             levels: Vec::new(),
@@ -134,7 +137,7 @@ impl Kernel {
         let group_count = (shapes.len() / (vertex_count * FEATURE_COUNT)).div_ceil(LANE_COUNT);
         self.levels.resize_with(weights.levels.len(), Vec::new);
         shapes_into_lanes(shapes, vertex_count, group_count, &mut self.error);
-        let floor = MASK_FLOOR / vertex_count as f32;
+        let floor = self.attention.floor(vertex_count);
         let last = weights.levels.len() - 1;
         let mut loss = 0.0;
         for (l, level) in weights.levels.iter().enumerate() {
@@ -240,7 +243,7 @@ impl Kernel {
         gradient: &mut StackWeights,
     ) -> f32 {
         let group_count = self.error.len() / weights.vertex_count;
-        let floor = MASK_FLOOR / weights.vertex_count as f32;
+        let floor = self.attention.floor(weights.vertex_count);
         let mut range = 0.0;
         for l in (0..weights.levels.len()).rev() {
             let level = &weights.levels[l];

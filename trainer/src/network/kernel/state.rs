@@ -57,7 +57,8 @@ impl BlockState {
             });
     }
 
-    /// Everything from the input to latents, output and, where a floor is given, masks; answers the weighted squared residual.
+    /// Everything from the input to latents, output and, where a floor is given, masks (equal ones where it is infinite);
+    /// answers the weighted squared residual.
     pub(super) fn forward(
         &mut self,
         block: &BlockWeights,
@@ -132,6 +133,10 @@ impl BlockState {
 
         if let Some(floor) = mask_floor {
             self.masks.resize(components.len(), ZERO_LANE);
+            if floor.is_infinite() {
+                self.masks.fill([1.0 / component_count as f32; LANE_COUNT]);
+                return losses.iter().map(|&loss| f64::from(loss)).sum();
+            }
             self.masks
                 .par_chunks_mut(CHUNK * width)
                 .enumerate()

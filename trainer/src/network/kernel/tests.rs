@@ -56,6 +56,7 @@ struct Case {
     vertex_weights: Vec<f32>,
     modes: Vec<f32>,
     outside: Vec<Vec<bool>>,
+    attention: Attention,
 }
 
 impl Case {
@@ -81,11 +82,21 @@ impl Case {
                 .iter()
                 .map(|rows| (0..rows * vertex_count).map(|at| at % 3 != 0).collect())
                 .collect(),
+            attention: Attention::Components,
         }
     }
 
+    fn sharing(self, attention: Attention) -> Self {
+        Self { attention, ..self }
+    }
+
     fn kernel(&self) -> Kernel {
-        Kernel::new(RingMean::new(&self.topology), &self.vertex_weights, &self.modes)
+        Kernel::new(
+            RingMean::new(&self.topology),
+            &self.vertex_weights,
+            &self.modes,
+            self.attention,
+        )
     }
 }
 
@@ -175,7 +186,10 @@ fn naive(case: &Case, components: &[f64], convolutions: &[f64], settings: &LossS
             let floor = 1e-6 / vertex_count as f64;
             let energy = |k: usize, v: usize| (0..9).map(|i| c(k, v * 9 + i).powi(2)).sum::<f64>() + floor;
             for k in 0..k_count {
-                let mask = |v: usize| energy(k, v) / (0..k_count).map(|j| energy(j, v)).sum::<f64>();
+                let mask = |v: usize| match case.attention {
+                    Attention::Components => energy(k, v) / (0..k_count).map(|j| energy(j, v)).sum::<f64>(),
+                    Attention::Equal => 1.0 / k_count as f64,
+                };
                 let masks: Vec<f64> = (0..vertex_count).map(mask).collect();
                 next.push(
                     residuals
@@ -211,6 +225,16 @@ fn doubles(numbers: &[f32]) -> Vec<f64> {
     numbers.iter().map(|&number| f64::from(number)).collect()
 }
 
+/// Components of each level, shapes, and how residuals are shared out.
+const CASES: [(&[usize], usize, Attention); 6] = [
+    (&[3], 2, Attention::Components),
+    (&[3, 2], 3, Attention::Components),
+    (&[2, 2, 2], 3, Attention::Components),
+    (&[9, 2], 11, Attention::Components),
+    (&[2, 2, 2], 3, Attention::Equal),
+    (&[9, 2], 11, Attention::Equal),
+];
+
 /// Every term at once, with a range that some latents leave.
 fn all_terms() -> LossSettings {
     LossSettings {
@@ -232,8 +256,8 @@ fn assert_close(found: f64, expected: f64, scale: f64, tolerance: f64, what: &st
 
 #[test]
 fn outputs_and_loss_equal_the_naive_model() {
-    for (counts, shape_count) in [(&[3][..], 2), (&[3, 2], 3), (&[2, 2, 2], 3), (&[9, 2], 11)] {
-        let case = Case::new(13, shape_count, counts);
+    for (counts, shape_count, attention) in CASES {
+        let case = Case::new(13, shape_count, counts).sharing(attention);
         let (components, convolutions) = (case.weights.flat_components(), case.weights.flat_convolutions());
         let expected = naive(&case, &doubles(&components), &doubles(&convolutions), &all_terms());
         let mut kernel = case.kernel();
@@ -301,6 +325,8 @@ fn gradients_of_all_terms_equal_differences() {
     for (counts, shape_count, stride) in [(&[3][..], 2, 3), (&[3, 2], 3, 5), (&[2, 2, 2], 3, 7), (&[9, 1], 9, 29)] {
         check_gradients(&Case::new(11, shape_count, counts), &all_terms(), stride);
     }
+    let equal = Case::new(11, 3, &[2, 2, 2]).sharing(Attention::Equal);
+    check_gradients(&equal, &all_terms(), 7);
 }
 
 #[test]
@@ -371,9 +397,10 @@ fn buffers_do_not_carry_over() {
 
 #[test]
 fn loss_and_every_gradient_equal_the_differentiable_model() {
-    for (counts, shape_count) in [(&[3][..], 2), (&[3, 2], 3), (&[2, 2, 2], 3), (&[9, 2], 11)] {
-        let case = Case::new(13, shape_count, counts);
-        let model = DifferentiableStack::new(&RingMean::new(&case.topology), &case.vertex_weights, &case.modes);
+    for (counts, shape_count, attention) in CASES {
+        let case = Case::new(13, shape_count, counts).sharing(attention);
+        let ring = RingMean::new(&case.topology);
+        let model = DifferentiableStack::new(&ring, &case.vertex_weights, &case.modes, attention);
         for settings in [all_terms(), LossSettings::paper(), LossSettings::local()] {
             let (expected_terms, expected) = model.differentiate(&case.weights, &case.shapes, &case.outside, &settings);
             let (terms, found) = case
