@@ -6,8 +6,10 @@
 pub mod bernard;
 pub mod gradient_field;
 pub mod huang;
+pub mod length_angle;
 pub mod linear;
 pub mod model;
 pub mod pca;
 pub mod splocs;
 pub mod tan;
+pub mod wang;

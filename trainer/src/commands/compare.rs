@@ -5,9 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use miette::{IntoDiagnostic, WrapErr, miette};
 use sinew_formats::package::CompactView;
-use sinew_trainer::compare::{
-    CompareError, CompareInput, CompareSettings, Comparison, LOCAL_RADIUS, NOT_COMPARED, compare,
-};
+use sinew_trainer::compare::{CompareError, CompareInput, CompareSettings, Comparison, LOCAL_RADIUS, compare};
 use sinew_trainer::config::TrainConfig;
 use sinew_trainer::learn::LearnError;
 use sinew_trainer::report::compare_page::comparison_page;
@@ -24,6 +22,7 @@ use super::{Failure, check_output, chosen_shapes, load_package, load_sequence};
   SPLOCS                  Neumann et al. 2013, on positions and on features
   Local factors           Bernard et al. 2016, on positions
   Deformation gradients   Huang et al. 2014
+  Lengths and angles      Wang et al. 2017
   One-level autoencoder   Tan et al. 2018
   Sinew                   this project, or --ours PACKAGE
 
@@ -181,7 +180,6 @@ fn print_table(comparison: &Comparison) {
         "features alone (floor)", "", "", floor.e_rms, floor.sted
     );
     println!("local: share of a component's energy within {LOCAL_RADIUS} of the longest distance from its centre");
-    println!("{NOT_COMPARED}");
     if !comparison.control_points.is_empty() {
         println!();
         print!("{:<22}", "E_rms, control points");

@@ -13,13 +13,15 @@ use super::{
 };
 use crate::bake::bake;
 use crate::baselines::bernard::bernard;
-use crate::baselines::gradient_field::{FaceField, GradientField};
+use crate::baselines::gradient_field::FaceField;
 use crate::baselines::huang::{face_features, huang};
+use crate::baselines::length_angle::LengthAngleField;
 use crate::baselines::linear::{LinearBasis, LinearProjection};
 use crate::baselines::model::{GradientModel, Model, PositionModel};
 use crate::baselines::pca::PrincipalComponents;
 use crate::baselines::splocs::{SplocsSettings, splocs};
 use crate::baselines::tan::{TanSettings, train};
+use crate::baselines::wang::{LengthAngleModel, wang};
 use crate::components::position_modes::keep_linear_algebra_serial;
 use crate::evaluate::{EvaluationError, EvaluationInput, FeatureDecoder, NormalisedPair, Scores, evaluate, score};
 use crate::features::scaler::FeatureScaler;
@@ -78,34 +80,62 @@ pub fn compare(input: CompareInput<'_>, reporter: &dyn Reporter) -> Result<(Comp
         bernard(&flat, topology, rest, &distances, count)
     })?;
 
-    let scales = bench.prepared.scaler.scales();
-    let own = Gradients {
-        field: &bench.prepared.system,
-        scales,
+    let own = Features {
         weights: &bench.areas,
         train: &bench.train_features,
         test: &bench.test_features,
+        model: &|basis| {
+            Box::new(GradientModel {
+                decoder: Box::new(basis),
+                field: &bench.prepared.system,
+                scales: bench.prepared.scaler.scales(),
+            })
+        },
     };
-    run.gradients("PCA on features", "Alexa and Müller 2000", &own, |train| {
+    run.features("PCA on features", "Alexa and Müller 2000", &own, |train| {
         PrincipalComponents::fit(train, count).into_basis(9)
     })?;
-    run.gradients("SPLOCS on features", SPLOCS_SOURCE, &own, |train| {
+    run.features("SPLOCS on features", SPLOCS_SOURCE, &own, |train| {
         splocs(train, 9, &distances, &SplocsSettings::published(count))
     })?;
 
     let field = FaceField::new(&bench.prepared.topology, &bench.prepared.rest)?;
-    let read = |shapes: &[Vec<[f64; 3]>]| -> Vec<Vec<f64>> {
-        shapes.par_iter().map(|shape| face_features(&field, shape)).collect()
+    let read = |shapes: &[Vec<[f64; 3]>], of: &(dyn Fn(&[[f64; 3]]) -> Vec<f64> + Sync)| -> Vec<Vec<f64>> {
+        shapes.par_iter().map(|shape| of(shape)).collect()
     };
-    let faces = Gradients {
-        field: &field,
-        scales: [1.0; 9],
+    let of_faces = |shape: &[[f64; 3]]| face_features(&field, shape);
+    let faces = Features {
         weights: &field.areas(),
-        train: &read(&bench.train),
-        test: &read(&bench.test),
+        train: &read(&bench.train, &of_faces),
+        test: &read(&bench.test, &of_faces),
+        model: &|basis| {
+            Box::new(GradientModel {
+                decoder: Box::new(basis),
+                field: &field,
+                scales: [1.0; 9],
+            })
+        },
     };
-    run.gradients("Deformation gradients", "Huang et al. 2014", &faces, |train| {
+    run.features("Deformation gradients", "Huang et al. 2014", &faces, |train| {
         huang(&field, train, &distances, count)
+    })?;
+
+    let lengths = LengthAngleField::new(&field)?;
+    let of_edges = |shape: &[[f64; 3]]| lengths.features(shape);
+    let edges = Features {
+        weights: &lengths.areas(),
+        train: &read(&bench.train, &of_edges),
+        test: &read(&bench.test, &of_edges),
+        model: &|basis| {
+            Box::new(LengthAngleModel {
+                basis,
+                field: &lengths,
+                vertex_count: vertices,
+            })
+        },
+    };
+    run.features("Lengths and angles", "Wang et al. 2017", &edges, |train| {
+        wang(&lengths, train, &distances, count)
     })?;
 
     run.one_level_autoencoder()?;
@@ -133,14 +163,13 @@ pub fn compare(input: CompareInput<'_>, reporter: &dyn Reporter) -> Result<(Comp
     Ok((comparison, shapes))
 }
 
-/// Features of one kind, with the solve behind them.
-struct Gradients<'g> {
-    field: &'g dyn GradientField,
-    scales: [f64; 9],
+/// Features of one kind, with the way from them to positions.
+struct Features<'g> {
     /// Of elements.
     weights: &'g [f64],
     train: &'g [Vec<f64>],
     test: &'g [Vec<f64>],
+    model: &'g dyn Fn(LinearBasis) -> Box<dyn Model + 'g>,
 }
 
 /// What a method found for the measured shapes, one way to find weights.
@@ -212,30 +241,26 @@ impl Run<'_, '_> {
         self.finish(trained, &model, vec![found])
     }
 
-    fn gradients(
+    fn features(
         &mut self,
         name: &str,
         source: &str,
-        gradients: &Gradients<'_>,
+        features: &Features<'_>,
         factor: impl FnOnce(&[Vec<f64>]) -> LinearBasis,
     ) -> Result<(), CompareError> {
         let started = self.begin(name)?;
-        let basis = factor(gradients.train);
+        let basis = factor(features.train);
         let training_seconds = Some(started.elapsed().as_secs_f64());
-        let projection = LinearProjection::new(&basis, gradients.weights);
-        let weights: Vec<Vec<f64>> = gradients.test.par_iter().map(|x| projection.weights(x)).collect();
-        let missed = gradients.test.par_iter().zip(&weights).map(|(x, weights)| {
+        let projection = LinearProjection::new(&basis, features.weights);
+        let weights: Vec<Vec<f64>> = features.test.par_iter().map(|x| projection.weights(x)).collect();
+        let missed = features.test.par_iter().zip(&weights).map(|(x, weights)| {
             let nearest = basis.compose(weights);
             let energy: f64 = x.iter().map(|x| x * x).sum();
             let error: f64 = x.iter().zip(&nearest).map(|(x, y)| (x - y).powi(2)).sum();
             if energy > STILL { error / energy } else { 0.0 }
         });
         let missed: Vec<f64> = missed.collect();
-        let model = GradientModel {
-            decoder: Box::new(basis.clone()),
-            field: gradients.field,
-            scales: gradients.scales,
-        };
+        let model = (features.model)(basis.clone());
         let mut found = vec![Found {
             kind: ProjectionKind::Features,
             shapes: weights
@@ -247,7 +272,7 @@ impl Run<'_, '_> {
         if !self.bench.input.settings.quick {
             let shapes = self.bench.test.par_iter().zip(weights);
             let posed = shapes.map(|(shape, start)| {
-                let weights = project_positions(&model, shape, start);
+                let weights = project_positions(&*model, shape, start);
                 narrowed(&model.pose(&weights))
             });
             found.push(Found {
@@ -261,9 +286,9 @@ impl Run<'_, '_> {
             source,
             training_seconds,
             package_bytes: None,
-            train_weights: gradients.train.iter().map(|x| projection.weights(x)).collect(),
+            train_weights: features.train.iter().map(|x| projection.weights(x)).collect(),
         };
-        self.finish(trained, &model, found)
+        self.finish(trained, &*model, found)
     }
 
     fn one_level_autoencoder(&mut self) -> Result<(), CompareError> {

@@ -21,10 +21,6 @@ pub use methods::compare;
 /// Radius within which a component's energy counts as local, as a share of the longest distance along the surface.
 pub const LOCAL_RADIUS: f32 = 0.2;
 
-/// What a reader of the paper's table will miss here.
-pub const NOT_COMPARED: &str =
-    "Of the paper's table, edge lengths and dihedral angles (Wang et al. 2017) are not here.";
-
 /// Numbers of control points that shapes are moved by.
 pub const HANDLE_COUNTS: [usize; 6] = [2, 5, 10, 20, 35, 50];
 

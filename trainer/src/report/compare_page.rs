@@ -12,7 +12,7 @@ use super::image::Image;
 use super::pictures::{Studio, distances, quantile};
 use super::raster::Style;
 use super::svg::{Bar, Line, bar_chart, escape, log_chart, number};
-use crate::compare::{ComparedShapes, Comparison, LOCAL_RADIUS, Method, NOT_COMPARED, Projection, ProjectionKind};
+use crate::compare::{ComparedShapes, Comparison, LOCAL_RADIUS, Method, Projection, ProjectionKind};
 use crate::features::align::{RigidMotion, widened};
 use crate::learn::package::bounding_diagonal;
 
@@ -129,7 +129,7 @@ fn write_table(page: &mut String, comparison: &Comparison) {
         &format!(
             "K: components that are not zero. Missed: share of a shape's energy, in the method's own features, that its components do \
              not give back, for the worst shape. Local: share of a component's energy within {LOCAL_RADIUS} of the longest distance \
-             from its centre. Basis: its numbers alone, at four and two bytes each, zeros left out. {NOT_COMPARED}",
+             from its centre. Basis: its numbers alone, at four and two bytes each, zeros left out.",
         ),
     );
     page.push_str(
