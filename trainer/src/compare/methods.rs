@@ -7,6 +7,7 @@ use sinew_formats::package::{AlignedBytes, BakedView, CompactView};
 
 use super::bench::{Bench, narrowed};
 use super::fitting::{project_linear, project_positions, weights_from_handles};
+use super::memory::PeakMemory;
 use super::{
     CompareError, CompareInput, ComparedShapes, Comparison, HANDLE_COUNTS, Method, Projection, ProjectionKind,
     two_levels,
@@ -179,10 +180,39 @@ struct Found {
     max_percentage_error: Option<f64>,
 }
 
+/// What training took; nothing where it was done before.
+#[derive(Debug, Clone, Copy, Default)]
+struct Cost {
+    seconds: Option<f64>,
+    peak_bytes: Option<usize>,
+}
+
+/// Measures what training takes from here on.
+struct Meter {
+    begun: Instant,
+    memory: PeakMemory,
+}
+
+impl Meter {
+    fn begin() -> Self {
+        let memory = PeakMemory::begin();
+        let begun = Instant::now();
+        Self { begun, memory }
+    }
+
+    fn cost(&self) -> Cost {
+        Cost {
+            seconds: Some(self.begun.elapsed().as_secs_f64()),
+            peak_bytes: self.memory.bytes(),
+        }
+    }
+}
+
 struct Trained<'m> {
     name: &'m str,
     source: &'m str,
-    training_seconds: Option<f64>,
+    cost: Cost,
+    note: Option<String>,
     package_bytes: Option<usize>,
     /// Weights of the training shapes. Shape: `[1 + M][K]`.
     train_weights: Vec<Vec<f64>>,
@@ -199,12 +229,12 @@ struct Run<'r, 'a> {
 }
 
 impl Run<'_, '_> {
-    fn begin(&self, name: &str) -> Result<Instant, CompareError> {
+    fn begin(&self, name: &str) -> Result<Meter, CompareError> {
         if self.reporter.stop_requested() {
             return Err(LearnError::Stopped.into());
         }
         self.reporter.stage(name, 1);
-        Ok(Instant::now())
+        Ok(Meter::begin())
     }
 
     fn positions(
@@ -213,9 +243,9 @@ impl Run<'_, '_> {
         source: &str,
         factor: impl FnOnce() -> LinearBasis,
     ) -> Result<(), CompareError> {
-        let started = self.begin(name)?;
+        let meter = self.begin(name)?;
         let basis = factor();
-        let training_seconds = Some(started.elapsed().as_secs_f64());
+        let cost = meter.cost();
         let projection = LinearProjection::new(&basis, &vec![1.0; self.bench.prepared.rest.len()]);
         let weights_of = |shapes: &[Vec<[f64; 3]>]| -> Vec<Vec<f64>> {
             let shapes = shapes.par_iter();
@@ -229,7 +259,8 @@ impl Run<'_, '_> {
         let trained = Trained {
             name,
             source,
-            training_seconds,
+            cost,
+            note: None,
             package_bytes: None,
             train_weights: weights_of(&self.bench.train),
         };
@@ -248,9 +279,9 @@ impl Run<'_, '_> {
         features: &Features<'_>,
         factor: impl FnOnce(&[Vec<f64>]) -> LinearBasis,
     ) -> Result<(), CompareError> {
-        let started = self.begin(name)?;
+        let meter = self.begin(name)?;
         let basis = factor(features.train);
-        let training_seconds = Some(started.elapsed().as_secs_f64());
+        let cost = meter.cost();
         let projection = LinearProjection::new(&basis, features.weights);
         let weights: Vec<Vec<f64>> = features.test.par_iter().map(|x| projection.weights(x)).collect();
         let missed = features.test.par_iter().zip(&weights).map(|(x, weights)| {
@@ -284,7 +315,8 @@ impl Run<'_, '_> {
         let trained = Trained {
             name,
             source,
-            training_seconds,
+            cost,
+            note: None,
             package_bytes: None,
             train_weights: features.train.iter().map(|x| projection.weights(x)).collect(),
         };
@@ -309,8 +341,8 @@ impl Run<'_, '_> {
         let name = "One-level autoencoder";
         self.begin(name)?;
         self.reporter.stage(name, settings.epochs as u64);
-        let started = Instant::now();
-        let package = train(
+        let meter = Meter::begin();
+        let (package, training) = train(
             &prepared,
             &config,
             &tan,
@@ -319,7 +351,13 @@ impl Run<'_, '_> {
             sequence.shape_count(),
             self.reporter,
         )?;
-        self.package(name, "Tan et al. 2018", &package, Some(started.elapsed().as_secs_f64()))
+        self.package(
+            name,
+            "Tan et al. 2018",
+            &package,
+            meter.cost(),
+            Some(training.to_string()),
+        )
     }
 
     fn ours(&mut self) -> Result<(), CompareError> {
@@ -331,14 +369,14 @@ impl Run<'_, '_> {
         } = self.bench.input;
         let (name, source) = ("Sinew", "two levels, this project");
         if let Some(package) = ours {
-            return self.package(name, source, package, None);
+            return self.package(name, source, package, Cost::default(), None);
         }
         self.begin(name)?;
         let mut config = settings.config.clone();
         config.components = two_levels(settings.component_count);
-        let started = Instant::now();
+        let meter = Meter::begin();
         let learned = learn(sequence, train_shapes, &config, &RunOptions::default(), self.reporter)?;
-        self.package(name, source, &learned.package, Some(started.elapsed().as_secs_f64()))
+        self.package(name, source, &learned.package, meter.cost(), None)
     }
 
     fn package(
@@ -346,7 +384,8 @@ impl Run<'_, '_> {
         name: &str,
         source: &str,
         package: &[u8],
-        training_seconds: Option<f64>,
+        cost: Cost,
+        note: Option<String>,
     ) -> Result<(), CompareError> {
         let bench = self.bench;
         let view = CompactView::open(package).map_err(EvaluationError::from)?;
@@ -393,7 +432,8 @@ impl Run<'_, '_> {
         let trained = Trained {
             name,
             source,
-            training_seconds,
+            cost,
+            note,
             package_bytes: Some(package.len()),
             train_weights,
         };
@@ -428,7 +468,9 @@ impl Run<'_, '_> {
             name: trained.name.to_owned(),
             source: trained.source.to_owned(),
             components: used,
-            training_seconds: trained.training_seconds,
+            training_seconds: trained.cost.seconds,
+            peak_bytes: trained.cost.peak_bytes,
+            note: trained.note.clone(),
             locality: bench.locality(&energies),
             basis_bytes_f32: bytes(4),
             basis_bytes_f16: bytes(2),

@@ -6,6 +6,7 @@
 
 mod bench;
 pub mod fitting;
+pub mod memory;
 mod methods;
 
 use serde::{Deserialize, Serialize};
@@ -84,6 +85,11 @@ pub struct Method {
     pub components: usize,
     /// Seconds of training, features not counted but in this project's own; `None` where it was trained before.
     pub training_seconds: Option<f64>,
+    /// Most bytes that training held at once, the sequence and its features not counted but in this project's own; `None`
+    /// where it was trained before, or where no [`memory::CountingAllocator`] counts.
+    pub peak_bytes: Option<usize>,
+    /// What a reader should know about its training.
+    pub note: Option<String>,
     /// Share of a component's energy within [`LOCAL_RADIUS`] of its centre, mean over components, in the values that the
     /// method factors.
     pub locality: f64,
