@@ -7,11 +7,13 @@
 //! rotations are averaged (Govindu 2004), every round one solve with the same factored Laplacian of the faces, so that
 //! frames stay rotations. Then positions: frames and flat faces make gradients, and [`FaceField`] solves for positions.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 
 use faer::sparse::Triplet;
 use nalgebra::{Matrix3, UnitQuaternion, Vector2, Vector3};
 
+use super::face_graph::{Link, spanning_tree, ties};
+use super::flat_face::Layout;
 use super::gradient_field::{FaceField, GradientField};
 use crate::features::align::RigidMotion;
 use crate::mesh::sparse_factor::{FactorError, SparseFactor};
@@ -24,35 +26,12 @@ const ROUND_LIMIT: usize = 20;
 const LEAST_GAIN: f64 = 1e-3;
 /// Mean squared disagreement, in radians, that is rounding.
 const AGREED: f64 = 1e-24;
-/// A flat face lower than this share of its base has no say in how its corner moves.
-const SLIVER: f64 = 1e-6;
-
 /// An edge of faces with area; where more than two meet, one for each pair of neighbours in the list.
 #[derive(Debug, Clone, Copy)]
 struct Edge {
     ends: [u32; 2],
     /// Face and corner it starts from, on both sides; the first alone at a boundary.
     sides: [Option<(usize, usize)>; 2],
-}
-
-/// What ties the frames of two faces.
-#[derive(Debug, Clone, Copy)]
-enum Link {
-    /// An edge between them.
-    Hinge { edge: usize, faces: [usize; 2] },
-    /// No edge, but another piece: they turn alike.
-    Tie {
-        faces: [usize; 2],
-        turn: UnitQuaternion<f64>,
-    },
-}
-
-impl Link {
-    fn faces(&self) -> [usize; 2] {
-        match self {
-            Self::Hinge { faces, .. } | Self::Tie { faces, .. } => *faces,
-        }
-    }
 }
 
 /// Edges, frames and solves of one rest shape. F faces, E edges.
@@ -430,66 +409,6 @@ impl<'f> LengthAngleField<'f> {
     }
 }
 
-/// A face in its plane: first corner at the origin, second on the axis.
-#[derive(Debug, Clone, Copy)]
-struct Layout {
-    second: Vector2<f64>,
-    third: Vector2<f64>,
-}
-
-impl Layout {
-    /// Of a face that takes no part.
-    const FLAT: Self = Self {
-        second: Vector2::new(1.0, 0.0),
-        third: Vector2::new(0.0, 1.0),
-    };
-
-    /// From the lengths of the edges that start at each corner. Lengths that make no triangle make a flat one.
-    fn new([base, opposite, side]: [f64; 3]) -> Self {
-        let x = ((base * base + side * side - opposite * opposite) / (2.0 * base)).clamp(-side, side);
-        Self {
-            second: Vector2::new(base, 0.0),
-            third: Vector2::new(x, (side * side - x * x).max(0.0).sqrt()),
-        }
-    }
-
-    /// Edges from the first corner, and the normal.
-    fn edges(&self) -> Matrix3<f64> {
-        Matrix3::from_columns(&[self.second.push(0.0), self.third.push(0.0), Vector3::z()])
-    }
-
-    /// The edge that starts at corner `n`.
-    fn edge(&self, n: usize) -> Vector2<f64> {
-        [self.second, self.third - self.second, -self.third][n]
-    }
-
-    fn direction(&self, n: usize) -> f64 {
-        let edge = self.edge(n);
-        edge.y.atan2(edge.x)
-    }
-
-    /// How second and third corner move with the lengths.
-    fn change(&self, [base, opposite, side]: [f64; 3], [d_base, d_opposite, d_side]: [f64; 3]) -> [Vector2<f64>; 2] {
-        let (x, y) = (self.third.x, self.third.y);
-        if y <= SLIVER * base {
-            let d_x = d_side * x.signum();
-            return [Vector2::new(d_base, 0.0), Vector2::new(d_x, 0.0)];
-        }
-        let d_x = ((base - x) * d_base + side * d_side - opposite * d_opposite) / base;
-        [
-            Vector2::new(d_base, 0.0),
-            Vector2::new(d_x, (side * d_side - x * d_x) / y),
-        ]
-    }
-
-    /// How the direction of the edge at corner `n` turns with the corners.
-    fn direction_change(&self, n: usize, [second, third]: &[Vector2<f64>; 2]) -> f64 {
-        let edge = self.edge(n);
-        let change = [*second, third - second, -third][n];
-        edge.perp(&change) / edge.norm_squared()
-    }
-}
-
 fn about(axis: Vector3<f64>, angle: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::new(axis * angle)
 }
@@ -501,69 +420,4 @@ fn frame_of(face: &[u32; 3], shape: &[[f64; 3]]) -> UnitQuaternion<f64> {
     let normal = (b - a).cross(&(c - a)).try_normalize(0.0);
     let normal = normal.unwrap_or_else(|| along.cross(&Vector3::new(along.y, along.z, -along.x)).normalize());
     UnitQuaternion::from_basis_unchecked(&[along, normal.cross(&along), normal])
-}
-
-/// Pairs of faces that join pieces which no edge joins: across bridges, then around vertices, then in order.
-fn ties(field: &FaceField, links: &[Link]) -> Vec<[usize; 2]> {
-    let faces = field.faces();
-    let with_area: Vec<usize> = (0..faces.len()).filter(|&f| field.has_area(f)).collect();
-    let mut faces_of: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-    for &f in &with_area {
-        for &v in &faces[f] {
-            faces_of.entry(v).or_default().push(f);
-        }
-    }
-    let first_of = |v: &u32| faces_of.get(v).and_then(|faces| faces.first().copied());
-    let bridges = field
-        .bridges()
-        .iter()
-        .filter_map(|[a, b]| Some([first_of(a)?, first_of(b)?]));
-    let around = faces_of
-        .values()
-        .flat_map(|faces| faces.windows(2).map(|pair| [pair[0], pair[1]]));
-    let listed = with_area.windows(2).map(|pair| [pair[0], pair[1]]);
-    let mut parent: Vec<usize> = (0..faces.len()).collect();
-    let mut join = |[f, g]: [usize; 2]| {
-        let mut roots = [f, g];
-        for root in &mut roots {
-            while parent[*root] != *root {
-                parent[*root] = parent[parent[*root]];
-                *root = parent[*root];
-            }
-        }
-        parent[roots[1]] = roots[0];
-        roots[0] != roots[1]
-    };
-    links.iter().for_each(|link| {
-        join(link.faces());
-    });
-    bridges.chain(around).chain(listed).filter(|&pair| join(pair)).collect()
-}
-
-/// Breadth first over the links: the walk, and the faces that it starts from.
-fn spanning_tree(face_count: usize, links: &[Link]) -> (Vec<(usize, bool)>, Vec<usize>) {
-    let mut links_of = vec![Vec::new(); face_count];
-    for (n, link) in links.iter().enumerate() {
-        let [f, g] = link.faces();
-        links_of[f].push((n, true, g));
-        links_of[g].push((n, false, f));
-    }
-    let mut reached = vec![false; face_count];
-    let (mut tree, mut roots) = (Vec::new(), Vec::new());
-    for root in 0..face_count {
-        if core::mem::replace(&mut reached[root], true) {
-            continue;
-        }
-        roots.push(root);
-        let mut open = VecDeque::from([root]);
-        while let Some(f) = open.pop_front() {
-            for &(link, forwards, g) in &links_of[f] {
-                if !core::mem::replace(&mut reached[g], true) {
-                    tree.push((link, forwards));
-                    open.push_back(g);
-                }
-            }
-        }
-    }
-    (tree, roots)
 }

@@ -4,6 +4,8 @@
 //! [`crate::compare`] fits to unseen shapes, scores, and moves by handles.
 
 pub mod bernard;
+mod face_graph;
+mod flat_face;
 pub mod gradient_field;
 pub mod huang;
 pub mod length_angle;

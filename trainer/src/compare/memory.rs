@@ -1,4 +1,4 @@
-//! Peak memory of a method: bytes held from the allocator, counted. A program that wants the figure installs
+//! What a method's training takes: time, and peak memory, bytes held from the allocator, counted. A program that wants the figure installs
 //! [`CountingAllocator`]; in any other, nothing is measured and nothing is said.
 //!
 //! Counted, not read off the process's resident set: what earlier methods freed stays resident or not as the C library
@@ -6,6 +6,7 @@
 
 use core::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::time::Instant;
 
 /// Bytes held, and the most of them.
 #[derive(Debug)]
@@ -78,13 +79,13 @@ unsafe impl GlobalAlloc for CountingAllocator {
 
 /// Counts from here on, for the whole process: one at a time.
 #[derive(Debug)]
-pub(super) struct PeakMemory {
+struct PeakMemory {
     counts: &'static Counts,
     held: usize,
 }
 
 impl PeakMemory {
-    pub(super) fn begin() -> Self {
+    fn begin() -> Self {
         Self::of(&COUNTS)
     }
 
@@ -95,8 +96,36 @@ impl PeakMemory {
     }
 
     /// The most bytes held at once beyond those at the beginning; `None` where nobody counts.
-    pub(super) fn bytes(&self) -> Option<usize> {
+    fn bytes(&self) -> Option<usize> {
         (self.held > 0).then(|| self.counts.most.load(Relaxed).saturating_sub(self.held))
+    }
+}
+
+/// What training took; nothing where it was done before.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Cost {
+    pub(super) seconds: Option<f64>,
+    pub(super) peak_bytes: Option<usize>,
+}
+
+/// Measures what training takes from here on.
+pub(super) struct Meter {
+    begun: Instant,
+    memory: PeakMemory,
+}
+
+impl Meter {
+    pub(super) fn begin() -> Self {
+        let memory = PeakMemory::begin();
+        let begun = Instant::now();
+        Self { begun, memory }
+    }
+
+    pub(super) fn cost(&self) -> Cost {
+        Cost {
+            seconds: Some(self.begun.elapsed().as_secs_f64()),
+            peak_bytes: self.memory.bytes(),
+        }
     }
 }
 

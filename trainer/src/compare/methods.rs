@@ -1,13 +1,12 @@
 //! Every method in turn: train, fit unseen shapes, score.
 
-use std::time::Instant;
-
 use rayon::prelude::*;
 use sinew_formats::package::{AlignedBytes, BakedView, CompactView};
 
 use super::bench::{Bench, narrowed};
-use super::fitting::{project_linear, project_positions, weights_from_handles};
-use super::memory::PeakMemory;
+use super::control_points::move_by_handles;
+use super::fitting::{project_linear, project_positions};
+use super::memory::{Cost, Meter};
 use super::{
     CompareError, CompareInput, ComparedShapes, Comparison, HANDLE_COUNTS, Method, Projection, ProjectionKind,
     two_levels,
@@ -24,13 +23,11 @@ use crate::baselines::splocs::{SplocsSettings, splocs};
 use crate::baselines::tan::{TanSettings, train};
 use crate::baselines::wang::{LengthAngleModel, wang};
 use crate::components::position_modes::keep_linear_algebra_serial;
-use crate::evaluate::{EvaluationError, EvaluationInput, FeatureDecoder, NormalisedPair, Scores, evaluate, score};
+use crate::evaluate::{EvaluationError, EvaluationInput, FeatureDecoder, Scores, evaluate, score};
 use crate::features::scaler::FeatureScaler;
 use crate::learn::prepare::Prepared;
 use crate::learn::{LearnError, Reporter, RunOptions, learn};
 
-/// Unseen shapes moved by control points.
-const HANDLE_SHAPES: usize = 8;
 /// First learning rate of the one-level autoencoder, as published.
 const TAN_RATE: f32 = 1e-3;
 /// Relative size below which a shape does not move: the missed share of its energy means nothing.
@@ -178,34 +175,6 @@ struct Found {
     kind: ProjectionKind,
     shapes: Vec<Vec<[f32; 3]>>,
     max_percentage_error: Option<f64>,
-}
-
-/// What training took; nothing where it was done before.
-#[derive(Debug, Clone, Copy, Default)]
-struct Cost {
-    seconds: Option<f64>,
-    peak_bytes: Option<usize>,
-}
-
-/// Measures what training takes from here on.
-struct Meter {
-    begun: Instant,
-    memory: PeakMemory,
-}
-
-impl Meter {
-    fn begin() -> Self {
-        let memory = PeakMemory::begin();
-        let begun = Instant::now();
-        Self { begun, memory }
-    }
-
-    fn cost(&self) -> Cost {
-        Cost {
-            seconds: Some(self.begun.elapsed().as_secs_f64()),
-            peak_bytes: self.memory.bytes(),
-        }
-    }
 }
 
 struct Trained<'m> {
@@ -476,48 +445,18 @@ impl Run<'_, '_> {
             basis_bytes_f16: bytes(2),
             package_bytes: trained.package_bytes,
             projections,
-            control_point_e_rms: self.move_by_handles(model, &trained.train_weights).map_err(fail)?,
+            control_point_e_rms: move_by_handles(
+                bench,
+                &self.handles,
+                &self.control_points,
+                model,
+                &trained.train_weights,
+            )
+            .map_err(fail)?,
         });
         self.reconstructions
             .push(found.into_iter().map(|found| found.shapes).collect());
         self.reporter.advance(1, "");
         Ok(())
-    }
-
-    /// E_rms of some measured shapes, their control points alone known, for every number of control points.
-    fn move_by_handles(
-        &self,
-        model: &dyn Model,
-        train_weights: &[Vec<f64>],
-    ) -> Result<Vec<f64>, crate::evaluate::ScoreError> {
-        let bench = self.bench;
-        if self.control_points.is_empty() {
-            return Ok(Vec::new());
-        }
-        let scales: Vec<f64> = (0..model.component_count())
-            .map(|k| {
-                let squares: f64 = train_weights.iter().map(|w| w[k] * w[k]).sum();
-                (squares / train_weights.len() as f64).sqrt()
-            })
-            .collect();
-        let count = HANDLE_SHAPES.min(bench.test.len());
-        let chosen: Vec<usize> = (0..count)
-            .map(|i| (2 * i + 1) * bench.test.len() / (2 * count))
-            .collect();
-        let truth: Vec<Vec<[f32; 3]>> = chosen.iter().map(|&n| bench.truth[n].clone()).collect();
-        let handles = model.handles(&self.handles);
-        let diagonal = bench.diagonal();
-        let errors = self.control_points.iter().map(|&count| {
-            let posed: Vec<Vec<[f32; 3]>> = chosen
-                .par_iter()
-                .map(|&n| {
-                    let targets: Vec<[f64; 3]> = self.handles[..count].iter().map(|&v| bench.test[n][v]).collect();
-                    let weights = weights_from_handles(&*handles, &targets, &scales, diagonal);
-                    narrowed(&model.pose(&weights))
-                })
-                .collect();
-            Ok(NormalisedPair::new(&truth, &posed)?.e_rms())
-        });
-        errors.collect()
     }
 }

@@ -5,6 +5,7 @@
 //! project's own training -> weights of unseen shapes, each method's own way ([`fitting`]) -> [`Comparison`].
 
 mod bench;
+mod control_points;
 pub mod fitting;
 pub mod memory;
 mod methods;
