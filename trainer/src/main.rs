@@ -9,6 +9,10 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use commands::Failure;
 
+/// For the peak memory that `sinew compare` prints.
+#[global_allocator]
+static ALLOCATOR: sinew_trainer::compare::memory::CountingAllocator = sinew_trainer::compare::memory::CountingAllocator;
+
 /// Learns a small, readable set of deformation components from a mesh sequence, coarse to fine.
 ///
 /// A first look:   sinew demo

@@ -253,6 +253,16 @@ fn methods_are_compared_on_one_split() {
         .and_then(|methods| methods.last())
         .expect("methods");
     assert_eq!(last["name"], "Sinew");
+    let peers = figures["methods"]
+        .as_array()
+        .map_or(&[][..], |methods| &methods[..methods.len() - 1]);
+    for peer in peers {
+        assert!(
+            peer["peak_bytes"].as_u64().is_some_and(|bytes| bytes > 10_000),
+            "{peer}"
+        );
+    }
+    assert!(last["peak_bytes"].is_null(), "trained before");
     assert!(
         last["training_seconds"].is_null() && last["projections"][0]["e_rms"].is_number(),
         "{last}"

@@ -67,6 +67,8 @@ pub struct FaceField {
     bridges: Vec<[u32; 2]>,
     /// Faces around the ends of each bridge.
     bridge_faces: Vec<Vec<usize>>,
+    /// Inverses of the faces' edges and normals at rest; `None` for those without area. Shape: `[F]`.
+    rest_inverses: Vec<Option<Matrix3<f64>>>,
     factor: SparseFactor,
 }
 
@@ -108,7 +110,13 @@ impl FaceField {
         }
         let ends = bridges.iter().map(|bridge| bridge.map(|v| v as usize));
         let bridge_faces = ends.map(|ends| ends.iter().flat_map(|&v| faces_around[v].clone()).collect());
+        let sound = faces.iter().zip(&halves);
+        let rest_inverses = sound.map(|(face, halves)| {
+            let frame = (halves[0] != 0.0).then(|| frame(face, rest));
+            frame.and_then(|frame| frame.try_inverse())
+        });
         Ok(Self {
+            rest_inverses: rest_inverses.collect(),
             bridge_faces: bridge_faces.collect(),
             rest: rest.to_vec(),
             factor: SparseFactor::from_lower(rest.len(), &lower)?,
@@ -121,16 +129,9 @@ impl FaceField {
     /// T of every face: takes its rest edges and unit normal to those of `shape` (`[V]`). Shape: `[F]`; the identity for
     /// faces without area at rest.
     pub fn gradients(&self, shape: &[[f64; 3]]) -> Vec<Matrix3<f64>> {
-        let faces = self.faces.iter().zip(&self.halves);
+        let faces = self.faces.iter().zip(&self.rest_inverses);
         faces
-            .map(|(face, halves)| {
-                if halves[0] == 0.0 {
-                    return Matrix3::identity();
-                }
-                let rest = frame(face, &self.rest);
-                rest.try_inverse()
-                    .map_or_else(Matrix3::identity, |inverse| frame(face, shape) * inverse)
-            })
+            .map(|(face, inverse)| inverse.map_or_else(Matrix3::identity, |inverse| frame(face, shape) * inverse))
             .collect()
     }
 
@@ -154,6 +155,21 @@ impl FaceField {
     /// The faces.
     pub fn faces(&self) -> &[[u32; 3]] {
         &self.faces
+    }
+
+    /// Pairs of vertices that no face joins and the solve does.
+    pub fn bridges(&self) -> &[[u32; 2]] {
+        &self.bridges
+    }
+
+    /// Whether face `f` has area at rest; one without has no gradient of its own.
+    pub fn has_area(&self, f: usize) -> bool {
+        self.rest_inverses[f].is_some()
+    }
+
+    /// Inverse of the matrix whose columns are two edges and the unit normal of face `f` at rest.
+    pub fn rest_inverse(&self, f: usize) -> Option<&Matrix3<f64>> {
+        self.rest_inverses[f].as_ref()
     }
 
     fn spoke(&self, from: u32, to: u32) -> Vector3<f64> {

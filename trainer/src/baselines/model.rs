@@ -294,7 +294,7 @@ impl Handles for GradientHandles<'_> {
     }
 }
 
-fn count_elements(energies: &[Vec<f64>]) -> Vec<usize> {
+pub(super) fn count_elements(energies: &[Vec<f64>]) -> Vec<usize> {
     energies
         .iter()
         .map(|energy| energy.iter().filter(|&&e| e != 0.0).count())

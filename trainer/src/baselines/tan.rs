@@ -5,6 +5,10 @@
 //!
 //! One difference: where the paper fades sparsity in between two distances (0.2 and 0.4 of the longest), the network here
 //! knows one cut, set in their middle.
+//!
+//! Training goes on until its loss stays level, within a budget of epochs: [`Training`] says which of the two ended it.
+
+use core::fmt;
 
 use sinew_formats::package::{AlignedBytes, FEATURE_COUNT, Quality};
 
@@ -15,17 +19,80 @@ use crate::learn::prepare::Prepared;
 use crate::learn::{LearnError, Reporter};
 use crate::network::loss::LossSettings;
 use crate::training::data::ShapesSource;
-use crate::training::fit::{FitInput, FitProgress, FitSettings, Flow, StopReason, fit};
+use crate::training::fit::{FitInput, FitProgress, FitSettings, Flow, fit};
 
 /// Middle of the paper's two distances.
 const SPARSITY_DISTANCE: f32 = 0.3;
+
+/// Epochs whose mean loss is compared with that of as many before them.
+const WINDOW: usize = 100;
+/// The loss is level when a window lowers it by less than this share ...
+const LEVEL: f64 = 0.01;
+/// ... so many times in a row.
+const LEVEL_WINDOWS: usize = 3;
+
+/// How the training ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Training {
+    /// Epochs run.
+    pub epochs: usize,
+    /// Epochs allowed.
+    pub budget: usize,
+    /// Whether the loss stayed level; else the budget ended it.
+    pub level: bool,
+    /// Share of the loss that the last hundred epochs took off; none in shorter trainings.
+    pub last_gain: Option<f64>,
+}
+
+impl fmt::Display for Training {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { epochs, budget, .. } = self;
+        if self.level {
+            return write!(formatter, "loss level after {epochs} of at most {budget} epochs");
+        }
+        write!(formatter, "not converged: ended by its budget of {budget} epochs")?;
+        match self.last_gain {
+            Some(gain) => write!(
+                formatter,
+                ", the last {WINDOW} lowered the loss by {:.1} %",
+                100.0 * gain
+            ),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Watches the loss, window by window.
+#[derive(Debug, Default)]
+struct Plateau {
+    sum: f64,
+    epochs: usize,
+    before: Option<f64>,
+    last_gain: Option<f64>,
+    level_windows: usize,
+}
+
+impl Plateau {
+    /// Takes one epoch's loss; whether it has been level for long enough.
+    fn is_level(&mut self, loss: f64) -> bool {
+        self.sum += loss;
+        self.epochs += 1;
+        if self.epochs.is_multiple_of(WINDOW) {
+            let mean = core::mem::take(&mut self.sum) / WINDOW as f64;
+            self.last_gain = self.before.replace(mean).map(|before| (before - mean) / before);
+            let level = self.last_gain.is_some_and(|gain| gain < LEVEL);
+            self.level_windows = if level { self.level_windows + 1 } else { 0 };
+        }
+        self.level_windows >= LEVEL_WINDOWS
+    }
+}
 
 /// How the autoencoder is trained.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TanSettings {
     /// K.
     pub component_count: usize,
-    /// Steps of Adam, each on all training shapes.
+    /// Steps of Adam at most, each on all training shapes.
     pub epochs: usize,
     /// First learning rate; the paper's is 1e-3.
     pub rate: f32,
@@ -54,7 +121,8 @@ impl TanSettings {
             final_share: 0.1,
             warm_up: 1,
             keep_supports: false,
-            validate_every: self.epochs.max(1),
+            // The weights of the last of these are kept.
+            validate_every: WINDOW.min(self.epochs.max(1)),
             patience: 0,
             checkpoint_every: self.epochs.max(1),
             loss: LossSettings {
@@ -68,7 +136,7 @@ impl TanSettings {
 }
 
 /// Trains on the shapes of `prepared`, which was made with [`TanSettings::config`]. Returns a compact package, which the
-/// usual evaluation measures.
+/// usual evaluation measures, and how the training ended.
 /// Errors: a loss that keeps overflowing, the reporter's wish to stop.
 pub fn train(
     prepared: &Prepared,
@@ -78,7 +146,7 @@ pub fn train(
     train_shapes: &[usize],
     shape_count: usize,
     reporter: &dyn Reporter,
-) -> Result<AlignedBytes, LearnError> {
+) -> Result<(AlignedBytes, Training), LearnError> {
     let vertex_count = prepared.rest.len();
     let mut shapes = vec![0.0; vertex_count * FEATURE_COUNT];
     for shape in &prepared.network {
@@ -91,13 +159,12 @@ pub fn train(
         position_modes: &[],
         distances: &distances,
     };
+    let (mut plateau, mut level, mut asked) = (Plateau::default(), false, false);
     let mut observe = |progress: &FitProgress| {
         reporter.advance(progress.step as u64, &format!("loss {:.3}", progress.loss.sum()));
-        if reporter.stop_requested() {
-            Flow::Stop
-        } else {
-            Flow::Continue
-        }
+        level = plateau.is_level(f64::from(progress.loss.sum()));
+        asked = reporter.stop_requested();
+        if level || asked { Flow::Stop } else { Flow::Continue }
     };
     let outcome = fit(
         &input,
@@ -109,7 +176,7 @@ pub fn train(
         &mut observe,
         None,
     )?;
-    if outcome.stop_reason == StopReason::Stopped {
+    if asked {
         return Err(LearnError::Stopped);
     }
     let quality = Quality {
@@ -126,7 +193,13 @@ pub fn train(
         &outcome.weights,
         quality,
     )?;
-    Ok(bytes)
+    let training = Training {
+        epochs: outcome.steps_run,
+        budget: settings.epochs,
+        level,
+        last_gain: plateau.last_gain,
+    };
+    Ok((bytes, training))
 }
 
 #[cfg(test)]
@@ -157,7 +230,8 @@ mod tests {
             .expect("threads");
         pool.install(|| {
             let prepared = Prepared::new(&sequence, &train_shapes, &config, &Silent).expect("a usable bar");
-            let bytes = train(&prepared, &config, &tan, "bar", &train_shapes, 6, &Silent).expect("trains");
+            let (bytes, training) = train(&prepared, &config, &tan, "bar", &train_shapes, 6, &Silent).expect("trains");
+            assert_eq!((training.epochs, training.level), (epochs, false));
             let input = EvaluationInput {
                 package: &bytes,
                 sequence: &sequence,
@@ -168,6 +242,25 @@ mod tests {
             let (evaluation, _) = evaluate(&input, &|_| ()).expect("measures");
             (evaluation, bytes)
         })
+    }
+
+    #[test]
+    fn a_loss_that_stays_level_ends_the_training() {
+        let mut plateau = Plateau::default();
+        let falling = (0..1000).position(|n| plateau.is_level(0.99_f64.powi(n)));
+        assert_eq!(falling, None, "a percent an epoch is not level");
+        let level = (0..1000).position(|_| plateau.is_level(1e-5));
+        assert_eq!(level, Some(LEVEL_WINDOWS * WINDOW - 1 + WINDOW));
+        let training = |level| Training {
+            epochs: 400,
+            budget: 500,
+            level,
+            last_gain: Some(0.25),
+        };
+        assert!(training(true).to_string().contains("level after 400 of at most 500"));
+        assert!(
+            training(false).to_string().contains("budget of 500") && training(false).to_string().contains("25.0 %")
+        );
     }
 
     #[test]

@@ -5,9 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use miette::{IntoDiagnostic, WrapErr, miette};
 use sinew_formats::package::CompactView;
-use sinew_trainer::compare::{
-    CompareError, CompareInput, CompareSettings, Comparison, LOCAL_RADIUS, NOT_COMPARED, compare,
-};
+use sinew_trainer::compare::{CompareError, CompareInput, CompareSettings, Comparison, LOCAL_RADIUS, compare};
 use sinew_trainer::config::TrainConfig;
 use sinew_trainer::learn::LearnError;
 use sinew_trainer::report::compare_page::comparison_page;
@@ -24,6 +22,7 @@ use super::{Failure, check_output, chosen_shapes, load_package, load_sequence};
   SPLOCS                  Neumann et al. 2013, on positions and on features
   Local factors           Bernard et al. 2016, on positions
   Deformation gradients   Huang et al. 2014
+  Lengths and angles      Wang et al. 2017
   One-level autoencoder   Tan et al. 2018
   Sinew                   this project, or --ours PACKAGE
 
@@ -46,8 +45,8 @@ pub struct CompareArguments {
     /// Seed of what is random
     #[arg(long, value_name = "NUMBER", default_value_t = 0)]
     seed: u64,
-    /// Epochs of the one-level autoencoder
-    #[arg(long, value_name = "N", default_value_t = 3000, value_parser = clap::value_parser!(u32).range(1..))]
+    /// Epochs of the one-level autoencoder at most: it ends when its loss stays level
+    #[arg(long, value_name = "N", default_value_t = 5000, value_parser = clap::value_parser!(u32).range(1..))]
     epochs: u32,
     /// A package trained on the same shapes, to stand for this project's own training
     #[arg(long, value_name = "PACKAGE")]
@@ -143,8 +142,8 @@ fn print_table(comparison: &Comparison) {
         comparison.seed
     );
     println!(
-        "{:<22} {:<10} {:>4} {:>8} {:>8} {:>8} {:>6} {:>8} {:>10} {:>10}",
-        "method", "fitted in", "K", "E_rms", "STED", "Perc", "local", "train s", "f32 bytes", "f16 bytes"
+        "{:<22} {:<10} {:>4} {:>8} {:>8} {:>8} {:>6} {:>8} {:>8} {:>10} {:>10}",
+        "method", "fitted in", "K", "E_rms", "STED", "Perc", "local", "train s", "peak MB", "f32 bytes", "f16 bytes"
     );
     for method in &comparison.methods {
         for (row, projection) in method.projections.iter().enumerate() {
@@ -167,8 +166,11 @@ fn print_table(comparison: &Comparison) {
                 let seconds = method
                     .training_seconds
                     .map_or_else(|| "-".to_owned(), |s| format!("{s:.1}"));
+                let peak = method
+                    .peak_bytes
+                    .map_or_else(|| "-".to_owned(), |bytes| format!("{:.1}", bytes as f64 / 1e6));
                 print!(
-                    " {:>6.2} {seconds:>8} {:>10} {:>10}",
+                    " {:>6.2} {seconds:>8} {peak:>8} {:>10} {:>10}",
                     method.locality, method.basis_bytes_f32, method.basis_bytes_f16
                 );
             }
@@ -181,7 +183,10 @@ fn print_table(comparison: &Comparison) {
         "features alone (floor)", "", "", floor.e_rms, floor.sted
     );
     println!("local: share of a component's energy within {LOCAL_RADIUS} of the longest distance from its centre");
-    println!("{NOT_COMPARED}");
+    println!("peak: most memory that training held at once, the sequence and its features not counted but in Sinew's");
+    for (method, note) in comparison.methods.iter().filter_map(|m| Some((m, m.note.as_ref()?))) {
+        println!("{}: {note}", method.name);
+    }
     if !comparison.control_points.is_empty() {
         println!();
         print!("{:<22}", "E_rms, control points");

@@ -1,36 +1,35 @@
 //! Every method in turn: train, fit unseen shapes, score.
 
-use std::time::Instant;
-
 use rayon::prelude::*;
 use sinew_formats::package::{AlignedBytes, BakedView, CompactView};
 
 use super::bench::{Bench, narrowed};
-use super::fitting::{project_linear, project_positions, weights_from_handles};
+use super::control_points::move_by_handles;
+use super::fitting::{project_linear, project_positions};
+use super::memory::{Cost, Meter};
 use super::{
     CompareError, CompareInput, ComparedShapes, Comparison, HANDLE_COUNTS, Method, Projection, ProjectionKind,
     two_levels,
 };
 use crate::bake::bake;
 use crate::baselines::bernard::bernard;
-use crate::baselines::gradient_field::{FaceField, GradientField};
+use crate::baselines::gradient_field::FaceField;
 use crate::baselines::huang::{face_features, huang};
+use crate::baselines::length_angle::LengthAngleField;
 use crate::baselines::linear::{LinearBasis, LinearProjection};
 use crate::baselines::model::{GradientModel, Model, PositionModel};
 use crate::baselines::pca::PrincipalComponents;
 use crate::baselines::splocs::{SplocsSettings, splocs};
 use crate::baselines::tan::{TanSettings, train};
+use crate::baselines::wang::{LengthAngleModel, wang};
 use crate::components::position_modes::keep_linear_algebra_serial;
 use crate::evaluate::{
-    EvaluationError, EvaluationInput, FeatureDecoder, FeatureMetric, FeatureProjection, NormalisedPair, Scores,
-    evaluate, score,
+    EvaluationError, EvaluationInput, FeatureDecoder, FeatureMetric, FeatureProjection, Scores, evaluate, score,
 };
 use crate::features::scaler::FeatureScaler;
 use crate::learn::prepare::Prepared;
 use crate::learn::{LearnError, Reporter, RunOptions, learn};
 
-/// Unseen shapes moved by control points.
-const HANDLE_SHAPES: usize = 8;
 /// First learning rate of the one-level autoencoder, as published.
 const TAN_RATE: f32 = 1e-3;
 /// Relative size below which a shape does not move: the missed share of its energy means nothing.
@@ -81,34 +80,62 @@ pub fn compare(input: CompareInput<'_>, reporter: &dyn Reporter) -> Result<(Comp
         bernard(&flat, topology, rest, &distances, count)
     })?;
 
-    let scales = bench.prepared.scaler.scales();
-    let own = Gradients {
-        field: &bench.prepared.system,
-        scales,
+    let own = Features {
         weights: &bench.areas,
         train: &bench.train_features,
         test: &bench.test_features,
+        model: &|basis| {
+            Box::new(GradientModel {
+                decoder: Box::new(basis),
+                field: &bench.prepared.system,
+                scales: bench.prepared.scaler.scales(),
+            })
+        },
     };
-    run.gradients("PCA on features", "Alexa and Müller 2000", &own, |train| {
+    run.features("PCA on features", "Alexa and Müller 2000", &own, |train| {
         PrincipalComponents::fit(train, count).into_basis(9)
     })?;
-    run.gradients("SPLOCS on features", SPLOCS_SOURCE, &own, |train| {
+    run.features("SPLOCS on features", SPLOCS_SOURCE, &own, |train| {
         splocs(train, 9, &distances, &SplocsSettings::published(count))
     })?;
 
     let field = FaceField::new(&bench.prepared.topology, &bench.prepared.rest)?;
-    let read = |shapes: &[Vec<[f64; 3]>]| -> Vec<Vec<f64>> {
-        shapes.par_iter().map(|shape| face_features(&field, shape)).collect()
+    let read = |shapes: &[Vec<[f64; 3]>], of: &(dyn Fn(&[[f64; 3]]) -> Vec<f64> + Sync)| -> Vec<Vec<f64>> {
+        shapes.par_iter().map(|shape| of(shape)).collect()
     };
-    let faces = Gradients {
-        field: &field,
-        scales: [1.0; 9],
+    let of_faces = |shape: &[[f64; 3]]| face_features(&field, shape);
+    let faces = Features {
         weights: &field.areas(),
-        train: &read(&bench.train),
-        test: &read(&bench.test),
+        train: &read(&bench.train, &of_faces),
+        test: &read(&bench.test, &of_faces),
+        model: &|basis| {
+            Box::new(GradientModel {
+                decoder: Box::new(basis),
+                field: &field,
+                scales: [1.0; 9],
+            })
+        },
     };
-    run.gradients("Deformation gradients", "Huang et al. 2014", &faces, |train| {
+    run.features("Deformation gradients", "Huang et al. 2014", &faces, |train| {
         huang(&field, train, &distances, count)
+    })?;
+
+    let lengths = LengthAngleField::new(&field)?;
+    let of_edges = |shape: &[[f64; 3]]| lengths.features(shape);
+    let edges = Features {
+        weights: &lengths.areas(),
+        train: &read(&bench.train, &of_edges),
+        test: &read(&bench.test, &of_edges),
+        model: &|basis| {
+            Box::new(LengthAngleModel {
+                basis,
+                field: &lengths,
+                vertex_count: vertices,
+            })
+        },
+    };
+    run.features("Lengths and angles", "Wang et al. 2017", &edges, |train| {
+        wang(&lengths, train, &distances, count)
     })?;
 
     run.one_level_autoencoder()?;
@@ -136,14 +163,13 @@ pub fn compare(input: CompareInput<'_>, reporter: &dyn Reporter) -> Result<(Comp
     Ok((comparison, shapes))
 }
 
-/// Features of one kind, with the solve behind them.
-struct Gradients<'g> {
-    field: &'g dyn GradientField,
-    scales: [f64; 9],
+/// Features of one kind, with the way from them to positions.
+struct Features<'g> {
     /// Of elements.
     weights: &'g [f64],
     train: &'g [Vec<f64>],
     test: &'g [Vec<f64>],
+    model: &'g dyn Fn(LinearBasis) -> Box<dyn Model + 'g>,
 }
 
 /// What a method found for the measured shapes, one way to find weights.
@@ -156,7 +182,8 @@ struct Found {
 struct Trained<'m> {
     name: &'m str,
     source: &'m str,
-    training_seconds: Option<f64>,
+    cost: Cost,
+    note: Option<String>,
     package_bytes: Option<usize>,
     /// Weights of the training shapes. Shape: `[1 + M][K]`.
     train_weights: Vec<Vec<f64>>,
@@ -173,12 +200,12 @@ struct Run<'r, 'a> {
 }
 
 impl Run<'_, '_> {
-    fn begin(&self, name: &str) -> Result<Instant, CompareError> {
+    fn begin(&self, name: &str) -> Result<Meter, CompareError> {
         if self.reporter.stop_requested() {
             return Err(LearnError::Stopped.into());
         }
         self.reporter.stage(name, 1);
-        Ok(Instant::now())
+        Ok(Meter::begin())
     }
 
     fn positions(
@@ -187,9 +214,9 @@ impl Run<'_, '_> {
         source: &str,
         factor: impl FnOnce() -> LinearBasis,
     ) -> Result<(), CompareError> {
-        let started = self.begin(name)?;
+        let meter = self.begin(name)?;
         let basis = factor();
-        let training_seconds = Some(started.elapsed().as_secs_f64());
+        let cost = meter.cost();
         let projection = LinearProjection::new(&basis, &vec![1.0; self.bench.prepared.rest.len()]);
         let weights_of = |shapes: &[Vec<[f64; 3]>]| -> Vec<Vec<f64>> {
             let shapes = shapes.par_iter();
@@ -203,7 +230,8 @@ impl Run<'_, '_> {
         let trained = Trained {
             name,
             source,
-            training_seconds,
+            cost,
+            note: None,
             package_bytes: None,
             train_weights: weights_of(&self.bench.train),
         };
@@ -215,30 +243,26 @@ impl Run<'_, '_> {
         self.finish(trained, &model, vec![found])
     }
 
-    fn gradients(
+    fn features(
         &mut self,
         name: &str,
         source: &str,
-        gradients: &Gradients<'_>,
+        features: &Features<'_>,
         factor: impl FnOnce(&[Vec<f64>]) -> LinearBasis,
     ) -> Result<(), CompareError> {
-        let started = self.begin(name)?;
-        let basis = factor(gradients.train);
-        let training_seconds = Some(started.elapsed().as_secs_f64());
-        let projection = LinearProjection::new(&basis, gradients.weights);
-        let weights: Vec<Vec<f64>> = gradients.test.par_iter().map(|x| projection.weights(x)).collect();
-        let missed = gradients.test.par_iter().zip(&weights).map(|(x, weights)| {
+        let meter = self.begin(name)?;
+        let basis = factor(features.train);
+        let cost = meter.cost();
+        let projection = LinearProjection::new(&basis, features.weights);
+        let weights: Vec<Vec<f64>> = features.test.par_iter().map(|x| projection.weights(x)).collect();
+        let missed = features.test.par_iter().zip(&weights).map(|(x, weights)| {
             let nearest = basis.compose(weights);
             let energy: f64 = x.iter().map(|x| x * x).sum();
             let error: f64 = x.iter().zip(&nearest).map(|(x, y)| (x - y).powi(2)).sum();
             if energy > STILL { error / energy } else { 0.0 }
         });
         let missed: Vec<f64> = missed.collect();
-        let model = GradientModel {
-            decoder: Box::new(basis.clone()),
-            field: gradients.field,
-            scales: gradients.scales,
-        };
+        let model = (features.model)(basis.clone());
         let mut found = vec![Found {
             kind: ProjectionKind::Features,
             shapes: weights
@@ -250,7 +274,7 @@ impl Run<'_, '_> {
         if !self.bench.input.settings.quick {
             let shapes = self.bench.test.par_iter().zip(weights);
             let posed = shapes.map(|(shape, start)| {
-                let weights = project_positions(&model, shape, start);
+                let weights = project_positions(&*model, shape, start);
                 narrowed(&model.pose(&weights))
             });
             found.push(Found {
@@ -262,11 +286,12 @@ impl Run<'_, '_> {
         let trained = Trained {
             name,
             source,
-            training_seconds,
+            cost,
+            note: None,
             package_bytes: None,
-            train_weights: gradients.train.iter().map(|x| projection.weights(x)).collect(),
+            train_weights: features.train.iter().map(|x| projection.weights(x)).collect(),
         };
-        self.finish(trained, &model, found)
+        self.finish(trained, &*model, found)
     }
 
     fn one_level_autoencoder(&mut self) -> Result<(), CompareError> {
@@ -287,8 +312,8 @@ impl Run<'_, '_> {
         let name = "One-level autoencoder";
         self.begin(name)?;
         self.reporter.stage(name, settings.epochs as u64);
-        let started = Instant::now();
-        let package = train(
+        let meter = Meter::begin();
+        let (package, training) = train(
             &prepared,
             &config,
             &tan,
@@ -297,7 +322,13 @@ impl Run<'_, '_> {
             sequence.shape_count(),
             self.reporter,
         )?;
-        self.package(name, "Tan et al. 2018", &package, Some(started.elapsed().as_secs_f64()))
+        self.package(
+            name,
+            "Tan et al. 2018",
+            &package,
+            meter.cost(),
+            Some(training.to_string()),
+        )
     }
 
     fn ours(&mut self) -> Result<(), CompareError> {
@@ -309,14 +340,14 @@ impl Run<'_, '_> {
         } = self.bench.input;
         let (name, source) = ("Sinew", "two levels, this project");
         if let Some(package) = ours {
-            return self.package(name, source, package, None);
+            return self.package(name, source, package, Cost::default(), None);
         }
         self.begin(name)?;
         let mut config = settings.config.clone();
         config.components = two_levels(settings.component_count);
-        let started = Instant::now();
+        let meter = Meter::begin();
         let learned = learn(sequence, train_shapes, &config, &RunOptions::default(), self.reporter)?;
-        self.package(name, source, &learned.package, Some(started.elapsed().as_secs_f64()))
+        self.package(name, source, &learned.package, meter.cost(), None)
     }
 
     fn package(
@@ -324,7 +355,8 @@ impl Run<'_, '_> {
         name: &str,
         source: &str,
         package: &[u8],
-        training_seconds: Option<f64>,
+        cost: Cost,
+        note: Option<String>,
     ) -> Result<(), CompareError> {
         let bench = self.bench;
         let view = CompactView::open(package).map_err(EvaluationError::from)?;
@@ -374,7 +406,8 @@ impl Run<'_, '_> {
         let trained = Trained {
             name,
             source,
-            training_seconds,
+            cost,
+            note,
             package_bytes: Some(package.len()),
             train_weights,
         };
@@ -409,54 +442,26 @@ impl Run<'_, '_> {
             name: trained.name.to_owned(),
             source: trained.source.to_owned(),
             components: used,
-            training_seconds: trained.training_seconds,
+            training_seconds: trained.cost.seconds,
+            peak_bytes: trained.cost.peak_bytes,
+            note: trained.note.clone(),
             locality: bench.locality(&energies),
             basis_bytes_f32: bytes(4),
             basis_bytes_f16: bytes(2),
             package_bytes: trained.package_bytes,
             projections,
-            control_point_e_rms: self.move_by_handles(model, &trained.train_weights).map_err(fail)?,
+            control_point_e_rms: move_by_handles(
+                bench,
+                &self.handles,
+                &self.control_points,
+                model,
+                &trained.train_weights,
+            )
+            .map_err(fail)?,
         });
         self.reconstructions
             .push(found.into_iter().map(|found| found.shapes).collect());
         self.reporter.advance(1, "");
         Ok(())
-    }
-
-    /// E_rms of some measured shapes, their control points alone known, for every number of control points.
-    fn move_by_handles(
-        &self,
-        model: &dyn Model,
-        train_weights: &[Vec<f64>],
-    ) -> Result<Vec<f64>, crate::evaluate::ScoreError> {
-        let bench = self.bench;
-        if self.control_points.is_empty() {
-            return Ok(Vec::new());
-        }
-        let scales: Vec<f64> = (0..model.component_count())
-            .map(|k| {
-                let squares: f64 = train_weights.iter().map(|w| w[k] * w[k]).sum();
-                (squares / train_weights.len() as f64).sqrt()
-            })
-            .collect();
-        let count = HANDLE_SHAPES.min(bench.test.len());
-        let chosen: Vec<usize> = (0..count)
-            .map(|i| (2 * i + 1) * bench.test.len() / (2 * count))
-            .collect();
-        let truth: Vec<Vec<[f32; 3]>> = chosen.iter().map(|&n| bench.truth[n].clone()).collect();
-        let handles = model.handles(&self.handles);
-        let diagonal = bench.diagonal();
-        let errors = self.control_points.iter().map(|&count| {
-            let posed: Vec<Vec<[f32; 3]>> = chosen
-                .par_iter()
-                .map(|&n| {
-                    let targets: Vec<[f64; 3]> = self.handles[..count].iter().map(|&v| bench.test[n][v]).collect();
-                    let weights = weights_from_handles(&*handles, &targets, &scales, diagonal);
-                    narrowed(&model.pose(&weights))
-                })
-                .collect();
-            Ok(NormalisedPair::new(&truth, &posed)?.e_rms())
-        });
-        errors.collect()
     }
 }

@@ -5,7 +5,9 @@
 //! project's own training -> weights of unseen shapes, each method's own way ([`fitting`]) -> [`Comparison`].
 
 mod bench;
+mod control_points;
 pub mod fitting;
+pub mod memory;
 mod methods;
 
 use serde::{Deserialize, Serialize};
@@ -20,10 +22,6 @@ pub use methods::compare;
 
 /// Radius within which a component's energy counts as local, as a share of the longest distance along the surface.
 pub const LOCAL_RADIUS: f32 = 0.2;
-
-/// What a reader of the paper's table will miss here.
-pub const NOT_COMPARED: &str =
-    "Of the paper's table, edge lengths and dihedral angles (Wang et al. 2017) are not here.";
 
 /// Numbers of control points that shapes are moved by.
 pub const HANDLE_COUNTS: [usize; 6] = [2, 5, 10, 20, 35, 50];
@@ -88,6 +86,11 @@ pub struct Method {
     pub components: usize,
     /// Seconds of training, features not counted but in this project's own; `None` where it was trained before.
     pub training_seconds: Option<f64>,
+    /// Most bytes that training held at once, the sequence and its features not counted but in this project's own; `None`
+    /// where it was trained before, or where no [`memory::CountingAllocator`] counts.
+    pub peak_bytes: Option<usize>,
+    /// What a reader should know about its training.
+    pub note: Option<String>,
     /// Share of a component's energy within [`LOCAL_RADIUS`] of its centre, mean over components, in the values that the
     /// method factors.
     pub locality: f64,

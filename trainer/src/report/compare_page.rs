@@ -12,7 +12,7 @@ use super::image::Image;
 use super::pictures::{Studio, distances, quantile};
 use super::raster::Style;
 use super::svg::{Bar, Line, bar_chart, escape, log_chart, number};
-use crate::compare::{ComparedShapes, Comparison, LOCAL_RADIUS, Method, NOT_COMPARED, Projection, ProjectionKind};
+use crate::compare::{ComparedShapes, Comparison, LOCAL_RADIUS, Method, Projection, ProjectionKind};
 use crate::features::align::{RigidMotion, widened};
 use crate::learn::package::bounding_diagonal;
 
@@ -129,12 +129,13 @@ fn write_table(page: &mut String, comparison: &Comparison) {
         &format!(
             "K: components that are not zero. Missed: share of a shape's energy, in the method's own features, that its components do \
              not give back, for the worst shape. Local: share of a component's energy within {LOCAL_RADIUS} of the longest distance \
-             from its centre. Basis: its numbers alone, at four and two bytes each, zeros left out. {NOT_COMPARED}",
+             from its centre. Basis: its numbers alone, at four and two bytes each, zeros left out. Peak: most memory that training held at once, the sequence and its \
+             features not counted but in Sinew's own.",
         ),
     );
     page.push_str(
         "<div class=\"scroll\"><table><thead><tr><th>method</th><th class=\"note\">source</th><th class=\"note\">fitted in</th><th>K</th>\
-         <th>E<sub>rms</sub></th><th>STED</th><th>missed</th><th>local</th><th>training</th><th>basis</th><th>package</th></tr></thead><tbody>",
+         <th>E<sub>rms</sub></th><th>STED</th><th>missed</th><th>local</th><th>training</th><th>peak</th><th>basis</th><th>package</th></tr></thead><tbody>",
     );
     let kilobytes = |bytes: usize| format!("{:.0} kB", bytes as f64 / 1e3);
     for method in &comparison.methods {
@@ -144,7 +145,7 @@ fn write_table(page: &mut String, comparison: &Comparison) {
             let _ = write!(
                 page,
                 "<tr{}><td>{}</td><td class=\"note\">{}</td><td class=\"note\">{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>\
-                 <td>{}</td><td>{}</td><td>{}</td></tr>",
+                 <td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
                 if main { " class=\"main\"" } else { "" },
                 escape(&first(method.name.clone())),
                 escape(&first(method.source.clone())),
@@ -159,6 +160,11 @@ fn write_table(page: &mut String, comparison: &Comparison) {
                         .training_seconds
                         .map_or_else(|| "before".to_owned(), |s| format!("{s:.1} s"))
                 ),
+                first(
+                    method
+                        .peak_bytes
+                        .map_or_else(|| "–".to_owned(), |bytes| format!("{:.1} MB", bytes as f64 / 1e6))
+                ),
                 first(format!(
                     "{} / {}",
                     kilobytes(method.basis_bytes_f32),
@@ -171,10 +177,13 @@ fn write_table(page: &mut String, comparison: &Comparison) {
     let _ = write!(
         page,
         "<tr><td>No components</td><td class=\"note\">features alone: the floor</td><td></td><td></td><td>{}</td><td>{}</td>\
-         <td></td><td></td><td></td><td></td><td></td></tr></tbody></table></div>",
+         <td></td><td></td><td></td><td></td><td></td><td></td></tr></tbody></table></div>",
         number(comparison.round_trip.e_rms),
         number(comparison.round_trip.sted)
     );
+    for (method, note) in comparison.methods.iter().filter_map(|m| Some((m, m.note.as_ref()?))) {
+        let _ = write!(page, "<p class=\"why\">{}: {}.</p>", escape(&method.name), escape(note));
+    }
 }
 
 fn write_handles(page: &mut String, comparison: &Comparison) {

@@ -39,15 +39,90 @@ impl ConvolutionSums {
         total
     }
 
-    /// `point += g xᵀ`, `neighbour += g meanᵀ`.
+    /// `point += g xᵀ`, `neighbour += g meanᵀ` for some triples, in their order. A tile of sums stays in registers while
+    /// all triples go by: to read and write every sum for every triple would cost twice the products.
     #[inline(always)]
-    fn add<const FUSED: bool>(&mut self, g: &Features, x: &Features, mean: &Features) {
-        for o in 0..FEATURE_COUNT {
-            for i in 0..FEATURE_COUNT {
-                add_product::<FUSED>(&mut self.point[o][i], &g[o], &x[i]);
-                add_product::<FUSED>(&mut self.neighbour[o][i], &g[o], &mean[i]);
+    fn add<const FUSED: bool>(&mut self, triples: &[Triple]) {
+        for o in (0..FEATURE_COUNT).step_by(TILE) {
+            for i in (0..FEATURE_COUNT).step_by(TILE) {
+                add_tile::<FUSED>(&mut self.point, o, i, triples, |triple| &triple.x);
+                add_tile::<FUSED>(&mut self.neighbour, o, i, triples, |triple| &triple.mean);
             }
         }
+    }
+}
+
+/// Sums of a tile are this many squared; with their factors they fill sixteen registers.
+const TILE: usize = 3;
+
+/// Triples that wait until there are so many.
+const PENDING: usize = 8;
+
+/// What one vertex and group adds to a convolution's gradient.
+#[derive(Clone, Copy)]
+struct Triple {
+    g: Features,
+    x: Features,
+    mean: Features,
+}
+
+impl Triple {
+    const ZERO: Self = Self {
+        g: ZERO_FEATURES,
+        x: ZERO_FEATURES,
+        mean: ZERO_FEATURES,
+    };
+}
+
+#[inline(always)]
+fn add_tile<const FUSED: bool>(
+    sums: &mut [Features; FEATURE_COUNT],
+    o: usize,
+    i: usize,
+    triples: &[Triple],
+    factor: impl Fn(&Triple) -> &Features,
+) {
+    let mut tile: [[Lane; TILE]; TILE] = core::array::from_fn(|a| core::array::from_fn(|b| sums[o + a][i + b]));
+    for triple in triples {
+        let x = factor(triple);
+        for a in 0..TILE {
+            for b in 0..TILE {
+                add_product::<FUSED>(&mut tile[a][b], &triple.g[o + a], &x[i + b]);
+            }
+        }
+    }
+    for a in 0..TILE {
+        for b in 0..TILE {
+            sums[o + a][i + b] = tile[a][b];
+        }
+    }
+}
+
+/// Triples on their way into the sums.
+struct Pending {
+    triples: [Triple; PENDING],
+    len: usize,
+}
+
+impl Pending {
+    const NONE: Self = Self {
+        triples: [Triple::ZERO; PENDING],
+        len: 0,
+    };
+
+    #[inline(always)]
+    fn push<const FUSED: bool>(&mut self, triple: Triple, sums: &mut ConvolutionSums) {
+        self.triples[self.len] = triple;
+        self.len += 1;
+        if self.len == PENDING {
+            self.flush::<FUSED>(sums);
+        }
+    }
+
+    #[inline(always)]
+    fn flush<const FUSED: bool>(&mut self, sums: &mut ConvolutionSums) {
+        sums.add::<FUSED>(&self.triples[..self.len]);
+        self.len = 0;
     }
 }
 
@@ -196,6 +271,7 @@ wide! {
     ) {
         let width = component_count.div_ceil(LANE_COUNT);
         let mut moved = vec![ZERO_FEATURES; group_count];
+        let mut pending = Pending::NONE;
         for i in 0..hidden.len() / group_count {
             let v = start + i;
             for p in 0..group_count {
@@ -211,16 +287,23 @@ wide! {
                 let t = &mut hidden[i * group_count + p];
                 for c in 0..FEATURE_COUNT {
                     let slope_at_rest = 1.0 - rest[c] * rest[c];
+                    let (value, towards_hidden) = (t[c], gradient[c]);
+                    let mut slope = ZERO_LANE;
                     for n in 0..LANE_COUNT {
-                        let value = t[c][n];
-                        moved[p][c][n] = value - rest[c];
-                        let towards_hidden = gradient[c][n];
-                        gradient[c][n] = towards_hidden * (1.0 - value * value);
-                        sums.bias[c][n] += gradient[c][n] - towards_hidden * slope_at_rest;
+                        slope[n] = 1.0 - value[n] * value[n];
+                    }
+                    for n in 0..LANE_COUNT {
+                        moved[p][c][n] = value[n] - rest[c];
+                    }
+                    for n in 0..LANE_COUNT {
+                        gradient[c][n] = towards_hidden[n] * slope[n];
+                    }
+                    for n in 0..LANE_COUNT {
+                        sums.bias[c][n] += gradient[c][n] - towards_hidden[n] * slope_at_rest;
                     }
                 }
                 let mean = ring_mean(ring, Field { values: x, width: group_count, group: p }, v);
-                sums.add::<FUSED>(&gradient, &x[index], &mean);
+                pending.push::<FUSED>(Triple { g: gradient, x: x[index], mean }, sums);
                 if has_parent {
                     *t = ZERO_FEATURES;
                     add_transposed::<FUSED>(t, &convolution.neighbour, &gradient);
@@ -240,6 +323,7 @@ wide! {
                 }
             }
         }
+        pending.flush::<FUSED>(sums);
     }
 }
 
@@ -255,15 +339,18 @@ wide! {
         component_gradient: &mut [Features],
         sums: &mut ConvolutionSums,
     ) {
+        let mut pending = Pending::NONE;
         for (i, gradient) in hat_gradient.iter_mut().enumerate() {
             let v = start + i / width;
             let field = Field { values: components, width, group: i % width };
-            sums.add::<FUSED>(gradient, field.at(v), &ring_mean(ring, field, v));
+            let triple = Triple { g: *gradient, x: *field.at(v), mean: ring_mean(ring, field, v) };
+            pending.push::<FUSED>(triple, sums);
             add_transposed::<FUSED>(&mut component_gradient[i], &convolution.point, gradient);
             let mut spread = ZERO_FEATURES;
             add_transposed::<FUSED>(&mut spread, &convolution.neighbour, gradient);
             *gradient = spread;
         }
+        pending.flush::<FUSED>(sums);
     }
 }
 

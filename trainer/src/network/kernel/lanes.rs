@@ -148,10 +148,10 @@ pub(crate) fn tanh<const FUSED: bool>(x: f32) -> f32 {
 /// tanh of nine features.
 #[inline(always)]
 pub(crate) fn tanh_features<const FUSED: bool>(x: &mut Features) {
-    for lane in x.iter_mut() {
-        for value in lane.iter_mut() {
-            *value = tanh::<FUSED>(*value);
-        }
+    // One long loop: eight turns would be unrolled before they are vectorised, and a series of this depth then stays in
+    // single instructions.
+    for value in x.as_flattened_mut() {
+        *value = tanh::<FUSED>(*value);
     }
 }
 
