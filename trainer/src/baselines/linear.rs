@@ -100,7 +100,8 @@ impl<'b> LinearProjection<'b> {
     }
 }
 
-fn weighted(values: &[f64], element_weights: &[f64], width: usize) -> Vec<f64> {
+/// Every element times its weight.
+pub(crate) fn weighted(values: &[f64], element_weights: &[f64], width: usize) -> Vec<f64> {
     let elements = values.chunks_exact(width).zip(element_weights);
     elements
         .flat_map(|(x, weight)| x.iter().map(move |x| x * weight))

@@ -5,6 +5,7 @@ use sinew_formats::package::{AlignedBytes, BakedView, CompactView};
 
 use super::bench::{Bench, narrowed};
 use super::control_points::move_by_handles;
+use super::feature_fit::FeatureFit;
 use super::fitting::{project_linear, project_positions};
 use super::memory::{Cost, Meter};
 use super::{
@@ -169,7 +170,7 @@ struct Features<'g> {
     weights: &'g [f64],
     train: &'g [Vec<f64>],
     test: &'g [Vec<f64>],
-    model: &'g dyn Fn(LinearBasis) -> Box<dyn Model + 'g>,
+    model: &'g (dyn Fn(LinearBasis) -> Box<dyn Model + 'g> + Sync),
 }
 
 /// What a method found for the measured shapes, one way to find weights.
@@ -253,8 +254,9 @@ impl Run<'_, '_> {
         let meter = self.begin(name)?;
         let basis = factor(features.train);
         let cost = meter.cost();
-        let projection = LinearProjection::new(&basis, features.weights);
-        let weights: Vec<Vec<f64>> = features.test.par_iter().map(|x| projection.weights(x)).collect();
+        let rest = &self.bench.prepared.rest;
+        let fit = FeatureFit::new(&basis, features.weights, &features.train[0], rest, features.model);
+        let weights = fit.weights(features.test);
         let missed = features.test.par_iter().zip(&weights).map(|(x, weights)| {
             let nearest = basis.compose(weights);
             let energy: f64 = x.iter().map(|x| x * x).sum();
@@ -289,7 +291,7 @@ impl Run<'_, '_> {
             cost,
             note: None,
             package_bytes: None,
-            train_weights: features.train.iter().map(|x| projection.weights(x)).collect(),
+            train_weights: fit.weights(features.train),
         };
         self.finish(trained, &*model, found)
     }

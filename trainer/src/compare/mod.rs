@@ -6,7 +6,8 @@
 
 mod bench;
 mod control_points;
-pub mod fitting;
+pub mod feature_fit;
+mod fitting;
 pub mod memory;
 mod methods;
 

@@ -2,7 +2,9 @@
 //! measured through the runtime, then the bytes.
 
 use rayon::prelude::*;
-use sinew_formats::package::{AlignedBytes, CompactView, OpenError, Provenance, Quality, WriteError, write_compact};
+use sinew_formats::package::{
+    AlignedBytes, BakedView, CompactView, OpenError, Provenance, Quality, WriteError, write_compact,
+};
 use sinew_runtime::{Basis, Workspace, WorkspaceError, WorkspaceLayout};
 
 use super::prepare::Prepared;
@@ -10,7 +12,7 @@ use super::stages::mixer;
 use crate::bake::{BakeError, Surface, bake};
 use crate::components::extract::LearnedBasis;
 use crate::config::TrainConfig;
-use crate::evaluate::{PlayError, Player, ScoreError, StackEncoder};
+use crate::evaluate::{FeatureDecoder, FeatureMetric, FeatureProjection, PlayError, Player, ScoreError, StackEncoder};
 use crate::network::weights::StackWeights;
 
 /// Why a learned basis cannot be packaged or measured.
@@ -114,12 +116,12 @@ pub fn package(
 ) -> Result<(AlignedBytes, usize, usize), PackageError> {
     let all: Vec<usize> = (0..prepared.network.len()).collect();
     let mut basis = draft(prepared, config, weights, &all)?;
-    measure_ranges(&mut basis, prepared, config, &all)?;
+    measure_final_ranges(&mut basis, prepared, config)?;
     let changes = measure_strengths(&mut basis, config)?;
     let removed_count = basis.prune(&changes, &config.prune, config.fit.attention);
     basis.order_by_strength();
-    // Masks are shared among the components that are left, so the weights of the rest have moved a little.
-    measure_ranges(&mut basis, prepared, config, &all)?;
+    // Without the redundant ones the weights of the rest have moved a little.
+    measure_final_ranges(&mut basis, prepared, config)?;
     let component_count = basis.components().count();
     let numbers: Vec<u32> = train_shapes.iter().map(|&m| m as u32).collect();
     let config_text = config.to_toml();
@@ -140,8 +142,9 @@ const NUMBER_OF_RANGE_MIXES: u64 = 1 << 41;
 /// Mixes whose weights count for the stops of the controls.
 const RANGE_MIXES: usize = 32;
 
-/// The stops of every control: the least and greatest weight that the encoder finds on the training shapes and on mixes of
-/// them, 0 included. A handful of poses alone would leave most controls one-sided.
+/// The stops of every control: the least and greatest weight of the training shapes and of mixes of them, 0 included. A
+/// handful of poses alone would leave most controls one-sided. While training goes on the encoder finds the weights, which
+/// is quick.
 fn measure_ranges(
     basis: &mut LearnedBasis,
     prepared: &Prepared,
@@ -152,6 +155,37 @@ fn measure_ranges(
     let view = compact.view()?;
     let surface = Surface::of_package(&view);
     let encoder = StackEncoder::new(&view, &surface.topology, config.fit.attention);
+    let codes = with_range_shapes(prepared, config, shapes, |shape| encoder.encode(shape).weights);
+    set_ranges(basis, &codes);
+    Ok(())
+}
+
+/// The same of what is packaged, weights by the projection that plays shapes best.
+fn measure_final_ranges(
+    basis: &mut LearnedBasis,
+    prepared: &Prepared,
+    config: &TrainConfig,
+) -> Result<(), PackageError> {
+    let compact = basis.write_draft()?;
+    let baked = bake(&compact.view()?)?;
+    let decoder = FeatureDecoder::new(&BakedView::open(&baked)?);
+    let areas: Vec<f64> = prepared.areas.iter().map(|&area| f64::from(area)).collect();
+    let metric = FeatureMetric::new(&prepared.system, prepared.scaler.scales(), &areas);
+    let projection = FeatureProjection::new(&decoder, metric);
+    let all: Vec<usize> = (0..prepared.network.len()).collect();
+    let rest = vec![0.0; decoder.component_count()];
+    let codes = with_range_shapes(prepared, config, &all, |shape| projection.weights(shape, rest.clone()));
+    set_ranges(basis, &codes);
+    Ok(())
+}
+
+/// `job` of the given training shapes and of mixes of them, in their order.
+fn with_range_shapes(
+    prepared: &Prepared,
+    config: &TrainConfig,
+    shapes: &[usize],
+    job: impl Fn(&[[f32; 9]]) -> Vec<f64> + Sync,
+) -> Vec<Vec<f64>> {
     let mixes = match config.mixes.per_step {
         0 => Vec::new(),
         _ => mixer(prepared, shapes, &config.mixes, config.seed).mixes(NUMBER_OF_RANGE_MIXES, RANGE_MIXES),
@@ -159,12 +193,14 @@ fn measure_ranges(
     let mixes: Vec<&[[f32; 9]]> = mixes.as_chunks::<9>().0.chunks(prepared.rest.len()).collect();
     let posed = shapes.iter().map(|&m| prepared.network[m].as_slice());
     let inputs: Vec<&[[f32; 9]]> = posed.chain(mixes).collect();
-    let codes: Vec<Vec<f64>> = inputs.par_iter().map(|shape| encoder.encode(shape).weights).collect();
+    inputs.par_iter().map(|shape| job(shape)).collect()
+}
+
+fn set_ranges(basis: &mut LearnedBasis, codes: &[Vec<f64>]) {
     for (k, component) in basis.components_mut().enumerate() {
         component.minimum = codes.iter().map(|code| code[k] as f32).fold(0.0, f32::min);
         component.maximum = codes.iter().map(|code| code[k] as f32).fold(0.0, f32::max);
     }
-    Ok(())
 }
 
 /// Plays every component alone at its farther stop. Sets its strength (mean displacement of what it moves, as a share of

@@ -23,7 +23,8 @@ use crate::network::weights::StackWeights;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RefineSettings {
-    /// Turns of finding weights and fitting components; 0 leaves the components as the fit left them.
+    /// Turns of finding weights and fitting components; 0 leaves the components as the fit left them. Projections gain by
+    /// it and the network's encoder loses, for it shares components that no longer serve it first.
     pub rounds: usize,
     /// Mixes a turn, fresh ones each. Several times the number of components, or they are learned by heart.
     pub samples: usize,
@@ -41,11 +42,10 @@ impl Default for RefineSettings {
 /// Number of the first mix of the first turn, far from those that everything else sees.
 const REFINE_MIXES: u64 = 1 << 43;
 
-/// Added to the diagonal of a vertex's normal equations as a share of their mean: a component that hardly ever moves there
-/// stays as it is.
+/// Added to each diagonal entry of a vertex's normal equations, as a share of it: what mixes hardly tell apart stays.
 const VERTEX_RIDGE: f64 = 1e-3;
 
-/// What one turn learns from: the inverse of each decoder's point matrix, by block, and K of each.
+/// Takes a change of decoded values back to one of C.
 type Undo = Option<SMatrix<f64, FEATURE_COUNT, FEATURE_COUNT>>;
 
 /// Refines `weights`, which the given `shapes` of `prepared` were learned from. Rows that come back have unit length, and
@@ -120,9 +120,12 @@ fn turn(
 fn correct(weights: &mut StackWeights, codes: &[Vec<f64>], residuals: &[Vec<[f32; FEATURE_COUNT]>]) {
     let vertex_count = weights.vertex_count;
     let component_count = codes.first().map_or(0, Vec::len);
-    let gram = DMatrix::from_fn(component_count, component_count, |i, j| {
+    let mut gram = DMatrix::from_fn(component_count, component_count, |i, j| {
         codes.iter().map(|code| code[i] * code[j]).sum::<f64>()
     });
+    for k in 0..component_count {
+        gram[(k, k)] *= 1.0 + VERTEX_RIDGE;
+    }
     let rows: Vec<&[f32]> = weights
         .blocks()
         .flat_map(|block| block.components.chunks_exact(vertex_count * FEATURE_COUNT))
@@ -165,11 +168,7 @@ fn correct_vertex(
     undo: &[Undo],
 ) -> Vec<(usize, [f32; FEATURE_COUNT])> {
     let count = reaching.len();
-    let mut normal = DMatrix::from_fn(count, count, |i, j| gram[(reaching[i], reaching[j])]);
-    let ridge = VERTEX_RIDGE * normal.diagonal().sum() / count.max(1) as f64;
-    for i in 0..count {
-        normal[(i, i)] += ridge;
-    }
+    let normal = DMatrix::from_fn(count, count, |i, j| gram[(reaching[i], reaching[j])]);
     let mut right = DMatrix::zeros(count, FEATURE_COUNT);
     for (code, residual) in codes.iter().zip(residuals) {
         for (i, &k) in reaching.iter().enumerate() {
