@@ -1,10 +1,16 @@
-//! Components: where they start (closed form, or random as published), what feeds their training (local mixes, position modes), and how they
-//! leave the trained network (extract, prune).
+//! Components: where they start (closed form, or random as published), what feeds their training (local mixes, position
+//! modes), how they leave the trained network (extract, prune), and what is seen of them in a package (fields, mirror pairs,
+//! labels, new names).
 
+pub mod anatomy;
 pub mod extract;
+pub mod fields;
+pub mod labels;
 pub mod mix;
 pub mod modes;
 pub mod position_modes;
 pub mod random_start;
 pub mod regions;
+pub mod rename;
 pub mod start;
+pub mod symmetry;

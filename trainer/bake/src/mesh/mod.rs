@@ -3,7 +3,7 @@
 mod bridge;
 pub mod cotangent;
 pub mod geodesic;
-mod nearest;
+pub mod nearest;
 pub mod sparse_factor;
 pub mod topology;
 pub mod unfolding;

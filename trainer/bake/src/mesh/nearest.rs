@@ -1,4 +1,5 @@
-//! Nearest vertices in space, outside one's own group: a balanced tree of axis-aligned splits. Used to lay bridges.
+//! Nearest vertices in space, outside one's own group: a balanced tree of axis-aligned splits. Used to lay bridges, and to
+//! find the vertex on the other side of a mirror plane.
 
 use super::topology::{difference, dot};
 
@@ -9,7 +10,7 @@ const LEAF_SIZE: usize = 8;
 const MIXED: u32 = u32::MAX;
 
 /// A search tree over some vertices, each in a group.
-pub(super) struct NearestVertices<'p> {
+pub struct NearestVertices<'p> {
     positions: &'p [[f64; 3]],
     /// Vertex and group, in the order of the leaves.
     items: Vec<(u32, u32)>,
@@ -29,7 +30,7 @@ struct Node {
 
 impl<'p> NearestVertices<'p> {
     /// Tree over `members` (indices into `positions`), `groups[n]` being the group of `members[n]`.
-    pub(super) fn new(positions: &'p [[f64; 3]], members: &[u32], groups: &[u32]) -> Self {
+    pub fn new(positions: &'p [[f64; 3]], members: &[u32], groups: &[u32]) -> Self {
         let items = members.iter().copied().zip(groups.iter().copied()).collect::<Vec<_>>();
         let mut tree = NearestVertices {
             positions,
@@ -85,7 +86,7 @@ impl<'p> NearestVertices<'p> {
 
     /// Up to `count` vertices nearest to `point` that are not of group `outside`, nearest first (the lower index of
     /// equals), with squared distances.
-    pub(super) fn nearest(&self, point: [f64; 3], outside: Option<u32>, count: usize) -> Vec<(u32, f64)> {
+    pub fn nearest(&self, point: [f64; 3], outside: Option<u32>, count: usize) -> Vec<(u32, f64)> {
         let mut found: Vec<(u32, f64)> = Vec::with_capacity(count + 1);
         let mut open = Vec::new();
         if !self.nodes.is_empty() {
