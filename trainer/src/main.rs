@@ -53,6 +53,8 @@ enum Command {
     Ablate(commands::ablate::AblateArguments),
     /// Show what is in a package: the tree of components, sizes, where it comes from
     Inspect(commands::inspect::InspectArguments),
+    /// Give components names of your own
+    Rename(commands::rename::RenameArguments),
     /// Write one pose as a mesh
     Frame(commands::frame::FrameArguments),
     /// Prepare a compact package for the frame path of an engine
@@ -72,6 +74,7 @@ fn main() -> ExitCode {
         Command::Compare(arguments) => commands::compare::run(&arguments, &console),
         Command::Ablate(arguments) => commands::ablate::run(&arguments, &console),
         Command::Inspect(arguments) => commands::inspect::run(&arguments),
+        Command::Rename(arguments) => commands::rename::run(&arguments, &console),
         Command::Frame(arguments) => commands::frame::run(&arguments, &console),
         Command::Bake(arguments) => commands::bake::run(&arguments, &console),
         Command::Synthesize(arguments) => commands::synthesize::run(&arguments, &console),

@@ -84,6 +84,8 @@ fn the_chain_from_shapes_to_a_pose() {
     assert!(!components.is_empty());
     let names: Vec<&str> = components.iter().filter_map(|c| c["name"].as_str()).collect();
     assert!(names.contains(&"c0"), "{names:?}");
+    let labels: Vec<&str> = components.iter().filter_map(|c| c["label"].as_str()).collect();
+    assert!(labels.len() == names.len() && json["mirror_plane"]["share"].is_number() && json["duplicates"].is_array());
     let kept = run(&["inspect", &model, "--config"]);
     assert!(kept.contains("per_step = 4"), "{kept}");
 
@@ -115,6 +117,19 @@ fn the_chain_from_shapes_to_a_pose() {
     let read = |name: &str| std::fs::read(at(name)).expect("the pose was written");
     assert_eq!(read("a.obj"), read("b.obj"));
     run(&["frame", &model, "-o", &at("rest.ply"), "-q"]);
+    // Names are the user's; the movement stays.
+    let named = at("named.sinew");
+    run(&["rename", &model, "c0=main-swing", "-o", &named, "-q"]);
+    run(&["frame", &named, "--set", "main-swing=0.1", "-o", &at("c.obj"), "-q"]);
+    assert_eq!(read("a.obj"), read("c.obj"));
+    run(&["rename", &named, "--labels", "--up", "z", "--front", "-x", "-q"]);
+    let table = run(&["inspect", &named, "--up", "z", "--front", "-x"]);
+    assert!(table.contains("main-swing (c0)") && table.contains("(c1)"), "{table}");
+    refused(&["rename", &model, "c0=c1", "-q"], &["c0", "c1"]);
+    refused(&["rename", &model, "nose=jaw", "-q"], &["nose", "inspect"]);
+    refused(&["rename", &model], &["nothing to rename"]);
+    refused(&["rename", &baked, "c0=jaw"], &["compact"]);
+    refused(&["inspect", &model, "--up", "x", "--front", "x"], &["axis"]);
     // Far beyond its stop: clamped, and said.
     let output = sinew(&["frame", &model, "--set", "c0=1000", "-o", &at("far.npy")]);
     assert!(output.status.success() && String::from_utf8_lossy(&output.stderr).contains("clamped"));

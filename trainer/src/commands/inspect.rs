@@ -8,8 +8,11 @@ use clap::Args;
 use miette::{IntoDiagnostic, WrapErr};
 use serde_json::json;
 use sinew_formats::package::{BakedView, CompactView, ComponentRecord, FastView, NONE, PackageKind};
+use sinew_trainer::components::anatomy::Anatomy;
+use sinew_trainer::components::fields::DUPLICATE_COSINE;
+use sinew_trainer::components::rename::places;
 
-use super::{Failure, load_package};
+use super::{Failure, Standing, load_package};
 
 /// Arguments of `sinew inspect`.
 #[derive(Args)]
@@ -17,7 +20,16 @@ use super::{Failure, load_package};
     after_help = "scale      how far from its centre a component was asked to stay, as a share of the longest distance on the surface
 strength   mean displacement of the vertices it moves, at its farther stop, as a share of the bounding box's diagonal
 locality   share of its energy inside `scale`
-range      weights seen on the training shapes and their mixes; the stops of the control"
+range      weights seen on the training shapes and their mixes; the stops of the control
+mirror     what does the same on the other side of the mirror plane, `self` where that is the component itself; with a minus
+           where it takes the opposite weight
+label      where it acts and how: its side (where the rest shape has a mirror plane), back or front, low or high; then
+           swing     about one axis, one way         bend    about one axis, here one way and there the other
+           twist     about the length of the region  turn    about several axes
+           stretch, squash (mostly one way), swell, shrink (all around), at the farther stop
+
+A label is a description; the name is what --set, knobs and takes use. `sinew rename` gives names, and labels as names.
+Baked packages hold no more of components than the runtime needs: labels and mirror images are those of compact ones."
 )]
 pub struct InspectArguments {
     /// Compact or baked package
@@ -28,6 +40,8 @@ pub struct InspectArguments {
     /// Print the configuration it was trained with, as TOML, and nothing else
     #[arg(long, conflicts_with = "json")]
     config: bool,
+    #[command(flatten)]
+    standing: Standing,
 }
 
 /// Runs `sinew inspect`.
@@ -51,10 +65,14 @@ pub fn run(arguments: &InspectArguments) -> Result<(), Failure> {
     let view = CompactView::open(&bytes).into_diagnostic().wrap_err_with(refuse)?;
     if arguments.config {
         out.push_str(view.provenance().config);
-    } else if arguments.json {
-        out = format!("{:#}\n", compact_json(&view, bytes.len()));
+        print(&out);
+        return Ok(());
+    }
+    let anatomy = Anatomy::of(&view, arguments.standing.axes()?);
+    if arguments.json {
+        out = format!("{:#}\n", compact_json(&view, &anatomy, bytes.len()));
     } else {
-        print_compact(&mut out, &view, bytes.len());
+        print_compact(&mut out, &view, &anatomy, bytes.len());
     }
     print(&out);
     Ok(())
@@ -78,24 +96,42 @@ fn support_counts(view: &CompactView<'_>) -> Vec<u32> {
         .collect()
 }
 
-fn compact_json(view: &CompactView<'_>, byte_count: usize) -> serde_json::Value {
+fn compact_json(view: &CompactView<'_>, anatomy: &Anatomy, byte_count: usize) -> serde_json::Value {
     let provenance = view.provenance();
     let quality = view.quality();
     let blocks: Vec<_> = view.blocks().collect();
     let supports = support_counts(view);
+    let places = places(view);
     let components: Vec<_> = view
         .components()
-        .zip(&supports)
-        .map(|(c, support)| {
+        .enumerate()
+        .map(|(k, c)| {
+            let mirror = anatomy.images[k].map(|image| {
+                let name = view.component(image.component).name;
+                json!({ "name": name, "cosine": image.cosine, "reversed": image.reversed })
+            });
             let block = &blocks[c.block as usize];
             let parent = (block.parent_component != NONE).then(|| view.component(block.parent_component as usize).name);
             json!({
                 "name": c.name, "level": block.level, "parent": parent, "centre_vertex": c.centre_vertex,
                 "scale": c.scale, "strength": c.strength, "locality": c.locality,
-                "range": [c.minimum, c.maximum], "vertices": support,
+                "range": [c.minimum, c.maximum], "vertices": supports[k], "place": places[k], "label": anatomy.labels[k],
+                "mirror": mirror,
             })
         })
         .collect();
+    let duplicates: Vec<_> = anatomy
+        .duplicates
+        .iter()
+        .map(|pair| {
+            let names = [pair.first, pair.second].map(|k| view.component(k).name);
+            json!({ "names": names, "cosine": pair.cosine })
+        })
+        .collect();
+    let plane = anatomy
+        .plane
+        .as_ref()
+        .map(|plane| json!({ "normal": plane.normal, "offset": plane.offset, "share": plane.share }));
     json!({
         "kind": "compact",
         "content_id": hex(view.content_id()),
@@ -105,6 +141,8 @@ fn compact_json(view: &CompactView<'_>, byte_count: usize) -> serde_json::Value 
         "bridges": view.bridges().len(),
         "blocks": blocks.len(),
         "components": components,
+        "mirror_plane": plane,
+        "duplicates": duplicates,
         "provenance": {
             "tool": provenance.tool, "sequence": provenance.sequence, "seed": provenance.seed,
             "shapes": provenance.shape_count, "train_shapes": provenance.train_shapes, "config": provenance.config,
@@ -116,7 +154,7 @@ fn compact_json(view: &CompactView<'_>, byte_count: usize) -> serde_json::Value 
     })
 }
 
-fn print_compact(out: &mut String, view: &CompactView<'_>, byte_count: usize) {
+fn print_compact(out: &mut String, view: &CompactView<'_>, anatomy: &Anatomy, byte_count: usize) {
     let provenance = view.provenance();
     let quality = view.quality();
     let words = view.support_bits().len() * 4;
@@ -151,50 +189,112 @@ fn print_compact(out: &mut String, view: &CompactView<'_>, byte_count: usize) {
     if quality.validation_e_rms >= 0.0 {
         let _ = writeln!(out, "  held-out E_rms while training: {:.2}", quality.validation_e_rms);
     }
+    print_alike(out, view, anatomy);
     let _ = writeln!(out);
-    let _ = writeln!(
-        out,
-        "{:<18} {:>6} {:>9} {:>9} {:>18} {:>9}",
-        "component", "scale", "strength", "locality", "range", "vertices"
-    );
-    let blocks: Vec<_> = view.blocks().collect();
-    let rows: Vec<(ComponentRecord<'_>, u32)> = view.components().zip(support_counts(view)).collect();
-    if let Some(root) = blocks.first() {
-        print_block(out, &blocks, &rows, root.first_component, root.component_count, 0);
+    let places = places(view);
+    let titles = view.components().zip(&places).map(|(c, place)| {
+        let depth = place.matches('.').count();
+        let known = if c.name == place {
+            String::new()
+        } else {
+            format!(" ({place})")
+        };
+        format!("{}{}{known}", "  ".repeat(depth), c.name)
+    });
+    let table = Table {
+        blocks: view.blocks().collect(),
+        rows: view.components().zip(support_counts(view)).collect(),
+        titles: titles.collect(),
+        anatomy,
+    };
+    table.print(out);
+}
+
+/// What mirrors what, and what doubles what.
+fn print_alike(out: &mut String, view: &CompactView<'_>, anatomy: &Anatomy) {
+    if let Some(plane) = &anatomy.plane {
+        let [x, y, z] = plane.normal;
+        let own = anatomy.images.iter().enumerate();
+        let own = own
+            .filter(|(k, image)| image.is_some_and(|image| image.component == *k))
+            .count();
+        let paired = anatomy.images.iter().flatten().count() - own;
+        let _ = writeln!(
+            out,
+            "  mirror plane {x:.3} x {y:+.3} y {z:+.3} z = {:.4}, across which {:.0} % of the surface meets itself: {} pairs of components, \
+             {own} their own image, {} without one",
+            plane.offset,
+            100.0 * plane.share,
+            paired / 2,
+            anatomy.images.len() - own - paired
+        );
+    } else {
+        let _ = writeln!(out, "  no mirror plane: the rest shape has no left and right");
+    }
+    if anatomy.duplicates.is_empty() {
+        let _ = writeln!(
+            out,
+            "  no duplicates: no two components of a level have a cosine of {DUPLICATE_COSINE} or more"
+        );
+    }
+    for pair in &anatomy.duplicates {
+        let [first, second] = [pair.first, pair.second].map(|k| view.component(k).name);
+        let _ = writeln!(out, "  duplicates: {first} and {second}, cosine {:.2}", pair.cosine);
     }
 }
 
-/// Depth-first, so that the children of a component stand under it.
-fn print_block(
-    out: &mut String,
-    blocks: &[sinew_formats::package::BlockRecord],
-    rows: &[(ComponentRecord<'_>, u32)],
-    first: u32,
-    count: u32,
-    depth: usize,
-) {
-    for k in first..first + count {
-        let (c, support) = &rows[k as usize];
+/// The tree of components, a line each.
+struct Table<'a> {
+    blocks: Vec<sinew_formats::package::BlockRecord>,
+    rows: Vec<(ComponentRecord<'a>, u32)>,
+    titles: Vec<String>,
+    anatomy: &'a Anatomy,
+}
+
+impl Table<'_> {
+    fn print(&self, out: &mut String) {
+        let width = self
+            .titles
+            .iter()
+            .map(|title| title.chars().count())
+            .fold(18, usize::max);
         let _ = writeln!(
             out,
-            "{:<18} {:>6.2} {:>9.4} {:>9.3} {:>8.2} .. {:>6.2} {:>9}",
-            format!("{}{}", "  ".repeat(depth), c.name),
-            c.scale,
-            c.strength,
-            c.locality,
-            c.minimum,
-            c.maximum,
-            support
+            "{:<width$} {:>6} {:>9} {:>9} {:>18} {:>9}  {:<8} label",
+            "component", "scale", "strength", "locality", "range", "vertices", "mirror"
         );
-        for child in blocks.iter().filter(|block| block.parent_component == k) {
-            print_block(
+        if let Some(root) = self.blocks.first() {
+            self.print_block(out, root.first_component, root.component_count, width);
+        }
+    }
+
+    /// Depth-first, so that the children of a component stand under it.
+    fn print_block(&self, out: &mut String, first: u32, count: u32, width: usize) {
+        for k in first..first + count {
+            let (c, support) = &self.rows[k as usize];
+            let mirror = self.anatomy.images[k as usize].map_or(String::new(), |image| {
+                let name = match image.component == k as usize {
+                    true => "self",
+                    false => self.rows[image.component].0.name,
+                };
+                format!("{}{name}", if image.reversed { "-" } else { "" })
+            });
+            let _ = writeln!(
                 out,
-                blocks,
-                rows,
-                child.first_component,
-                child.component_count,
-                depth + 1,
+                "{:<width$} {:>6.2} {:>9.4} {:>9.3} {:>8.2} .. {:>6.2} {:>9}  {:<8} {}",
+                self.titles[k as usize],
+                c.scale,
+                c.strength,
+                c.locality,
+                c.minimum,
+                c.maximum,
+                support,
+                mirror,
+                self.anatomy.labels[k as usize]
             );
+            for child in self.blocks.iter().filter(|block| block.parent_component == k) {
+                self.print_block(out, child.first_component, child.component_count, width);
+            }
         }
     }
 }

@@ -8,14 +8,17 @@ pub mod demo;
 pub mod evaluate;
 pub mod frame;
 pub mod inspect;
+pub mod rename;
 pub mod synthesize;
 pub mod train;
 
 use std::path::Path;
 
+use clap::Args;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use sinew_formats::interchange::{MeshSequence, read_sequence};
 use sinew_formats::package::{AlignedBytes, read_package};
+use sinew_trainer::components::labels::{Axes, Axis};
 use sinew_trainer::config::{Recipe, TrainConfig};
 use sinew_trainer::learn::Reporter;
 
@@ -32,6 +35,23 @@ pub enum Failure {
 impl From<Report> for Failure {
     fn from(report: Report) -> Self {
         Self::Refused(report)
+    }
+}
+
+/// Which way the rest shape stands, for labels.
+#[derive(Args)]
+struct Standing {
+    /// The axis that points up, for labels [default: y]
+    #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
+    up: Option<Axis>,
+    /// The axis that points to the front, for labels [default: z; where z is up, -y]
+    #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
+    front: Option<Axis>,
+}
+
+impl Standing {
+    fn axes(&self) -> Result<Axes, Report> {
+        Axes::new(self.up, self.front).into_diagnostic()
     }
 }
 

@@ -66,8 +66,10 @@ pub struct ComponentPicture {
     pub locality: f64,
     /// Least and largest weight seen in training.
     pub range: [f64; 2],
-    /// Names of redundant components that were dropped for it.
-    pub duplicates: Vec<String>,
+    /// Where it acts and how, in words.
+    pub label: String,
+    /// Name of the component that does the same on the other side, where there is one.
+    pub mirror: Option<String>,
 }
 
 /// One shape, truth beside reconstruction.
@@ -186,7 +188,7 @@ impl Report {
             "A component is one learned movement with one control. Each picture shows the mesh with that control turned up and every \
              other at zero. Clay does not move; the darker the colour, the farther a vertex goes. A coarse component on the left \
              moves a large part; the fine ones beside it refine what happens inside its region. Strength says how much a component \
-             deforms, locality how much of that stays inside its region, range which weights occurred in training.",
+             deforms, locality how much of that stays inside its region, range which weights occurred in training. The words say where it acts and how.",
         );
         legend(page, ColorMap::Warm, "at rest", &self.component_scale);
         for (k, component) in self.tree.iter().enumerate() {
@@ -237,16 +239,17 @@ impl Report {
         }
         let _ = write!(
             page,
-            "<figcaption><b>{}</b> · level {}<br>strength {} · locality {:.0} %<br>range {} to {}",
+            "<figcaption><b>{}</b> · level {}<br>{}<br>strength {} · locality {:.0} %<br>range {} to {}",
             escape(&component.name),
             component.level + 1,
+            escape(&component.label),
             number(component.strength),
             100.0 * component.locality,
             number(component.range[0]),
             number(component.range[1])
         );
-        if !component.duplicates.is_empty() {
-            let _ = write!(page, "<br>stands for {} too", escape(&component.duplicates.join(", ")));
+        if let Some(mirror) = &component.mirror {
+            let _ = write!(page, "<br>mirror image of {}", escape(mirror));
         }
         page.push_str("</figcaption></figure>");
         Ok(())

@@ -9,6 +9,8 @@ use super::html::{Comparison, ComponentPicture, CurvePoint, ErrorRow, Picture, R
 use super::pictures::{Studio, distances, quantile};
 use super::raster::Style;
 use crate::baselines::pca::{reconstruct_features, reconstruct_positions};
+use crate::components::anatomy::Anatomy;
+use crate::components::labels::Axes;
 use crate::evaluate::{Evaluation, NormalisedPair, Reconstructions, ScoreError, Scores, score};
 use crate::features::acap::AcapFeatures;
 use crate::features::align::align_shapes;
@@ -183,6 +185,7 @@ fn component_pictures(
     // One scale for all, so that strong and weak can be told apart; the strongest few may run over it.
     let most = quantile(&reach, 0.9);
     let blocks: Vec<_> = view.blocks().collect();
+    let anatomy = Anatomy::of(view, Axes::default());
     let mut pictures = Vec::with_capacity(component_count);
     for (k, component) in view.components().enumerate() {
         let block = &blocks[component.block as usize];
@@ -201,7 +204,10 @@ fn component_pictures(
             strength: f64::from(component.strength),
             locality: f64::from(component.locality),
             range: [f64::from(component.minimum), f64::from(component.maximum)],
-            duplicates: Vec::new(),
+            label: anatomy.labels[k].clone(),
+            mirror: anatomy.images[k]
+                .filter(|image| image.component != k)
+                .map(|image| view.component(image.component).name.to_owned()),
         });
         reporter.advance(k as u64 + 1, component.name);
     }

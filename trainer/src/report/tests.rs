@@ -183,7 +183,8 @@ fn sample_report() -> Report {
         strength: 0.4,
         locality: 0.93,
         range: [-1.5, 2.0],
-        duplicates: if negative { vec!["c07".to_owned()] } else { Vec::new() },
+        label: "left-front-swing".to_owned(),
+        mirror: negative.then(|| "c07".to_owned()),
     };
     Report {
         title: "A <creature> & its \"parts\"".to_owned(),
