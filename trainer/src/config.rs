@@ -166,7 +166,7 @@ pub struct StartSettings {
     pub samples: usize,
     /// k-subspace rounds behind the first clustering.
     pub rounds: usize,
-    /// Distance at which a root component is cut off, as a share of the longest one.
+    /// Distance at which a root component is cut off, as a share of the longest one; at least twice the reach of mixes.
     pub root_reach: f32,
     /// Centres that mixes may choose from, spread over the surface.
     pub centres: usize,

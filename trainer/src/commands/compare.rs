@@ -26,7 +26,8 @@ use super::{Failure, check_output, chosen_shapes, load_package, load_sequence};
   One-level autoencoder   Tan et al. 2018
   Sinew                   this project, or --ours PACKAGE
 
-Weights of unseen shapes are found by a network's encoder, by least squares in features, or by least squares in positions: \
+Weights of unseen shapes are found by a network's encoder, by least squares in features (which count what they do to positions \
+        too, for every method), or by least squares in positions: \
         compare like with like. Less is better in E_rms and STED; more is better in locality.
 
 Examples:

@@ -18,7 +18,7 @@ use super::{Failure, chosen_shapes, load_package, load_sequence};
 #[command(
     after_help = "Three ways to find the weights of an unseen shape, all with the same components and all played by the runtime:
   encoder              the network's own answer, one pass
-  feature projection   least squares on features, from there
+  feature projection   least squares on features and, to first order, on what they do to positions, from there
   position projection  Gauss-Newton on positions, from there: what the components can do
 and the round trip: features to positions without components, below which no figure can fall.
 

@@ -125,7 +125,7 @@ pub struct Projection {
 pub enum ProjectionKind {
     /// A network's own encoder.
     Encoder,
-    /// Least squares in features.
+    /// Least squares in features and, to first order at the reference, in what they do to positions.
     Features,
     /// Least squares in positions.
     Positions,

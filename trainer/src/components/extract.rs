@@ -21,6 +21,8 @@ pub struct PruneSettings {
     /// Components that act on a vertex, on average: the entries that move least, at the stops of their controls,
     /// are cut until no more are left.
     pub entries_per_vertex: f64,
+    /// Entries that stay in any case: a frame's cost goes with all of them, so a small mesh affords more on a vertex.
+    pub entries_min: usize,
 }
 
 impl Default for PruneSettings {
@@ -29,6 +31,8 @@ impl Default for PruneSettings {
             least_strength: 1e-3,
             moved: 1e-6,
             entries_per_vertex: 7.2,
+            // What a mesh of 12,500 vertices has.
+            entries_min: 90_000,
         }
     }
 }
@@ -187,11 +191,12 @@ impl LearnedBasis {
         self.blocks.iter_mut().flat_map(|block| &mut block.components)
     }
 
-    /// Cuts the faint parts of all components until [`PruneSettings::entries_per_vertex`] are left on average: those that
+    /// Cuts the faint parts of all components until as many are left as [`PruneSettings`] allow: those that
     /// change features least when their control stands at its farther stop, so that weak components lose more than
     /// strong ones. Ranges must be known; centres and localities are measured anew.
     pub fn cut_faint_parts(&mut self, settings: &PruneSettings, distances: &dyn Fn(usize) -> Vec<f32>) {
         let budget = (settings.entries_per_vertex * self.rest_positions.len() as f64) as usize;
+        let budget = budget.max(settings.entries_min);
         let effect = |component: &LearnedComponent, x: &[f32; 9]| energy(x) * f64::from(component.reach()).powi(2);
         let mut effects: Vec<f64> = self
             .components()

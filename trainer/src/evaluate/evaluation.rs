@@ -54,7 +54,7 @@ pub struct Evaluation {
     pub components: ComponentCounts,
     /// Weights from the network's encoder.
     pub encoder: Scores,
-    /// Weights by least squares in feature space.
+    /// Weights by least squares in feature space, in the metric of [`FeatureMetric`].
     pub feature_projection: Scores,
     /// Weights by Gauss-Newton on positions.
     pub position_projection: Scores,

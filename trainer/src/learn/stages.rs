@@ -91,7 +91,8 @@ fn start_of_seed(
         samples: &samples,
         component_counts: &config.components,
         attention: config.fit.attention,
-        root_reach: config.start.root_reach,
+        // What mixes move as one is not cut into pieces.
+        root_reach: config.start.root_reach.max(2.0 * mixes.reach as f32),
         rounds: config.start.rounds,
         seed,
     };
