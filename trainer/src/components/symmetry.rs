@@ -10,8 +10,8 @@ use super::fields::Field;
 use crate::mesh::nearest::NearestVertices;
 use crate::mesh::topology::Topology;
 
-/// Share of the surface that must meet the surface again behind the mirror. Shapes made symmetric reach 0.98 and more, others
-/// hardly 0.65.
+/// Share of the surface that must meet the surface again behind the mirror. The gallop horse, remeshed without symmetry,
+/// reaches 0.97; other planes of animals, people, clothes and plants hardly reach 0.65.
 pub const LEAST_SHARE: f64 = 0.9;
 /// How near counts as met: this share of the bounding box's diagonal, and what lies between vertices.
 const NEARNESS: f64 = 0.005;
