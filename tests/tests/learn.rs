@@ -134,7 +134,7 @@ fn unseen_shapes_are_played_from_few_components() {
         sequence: &sequence,
         test_shapes: &[1, 3, 5, 7, 9, 11, 13],
         settings: learned.config.features,
-        attention: learned.config.fit.attention,
+        encoder: learned.config.encoder(),
     };
     let (evaluation, _) = evaluate(&input, &|_| {}).expect("the package can be measured");
     assert!(evaluation.position_projection.e_rms < UNSEEN_E_RMS, "{evaluation:?}");

@@ -8,9 +8,8 @@ use sinew_runtime::{
     Basis, Controls, Drag, Frame, Handles, HandlesLayout, Kernels, TierChoice, Workspace, WorkspaceLayout,
 };
 use sinew_trainer::bake::{BakeOptions, Surface, bake, bake_with};
-use sinew_trainer::evaluate::StackEncoder;
+use sinew_trainer::evaluate::{EncoderSettings, StackEncoder};
 use sinew_trainer::features::reconstruct::PoissonSystem;
-use sinew_trainer::network::attention::Attention;
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -69,7 +68,7 @@ fn the_exact_tier_is_the_unfolded_network_in_f64() -> Result<(), Box<dyn Error>>
     let Some(bytes) = package() else { return Ok(()) };
     let compact = CompactView::open(&bytes)?;
     let surface = Surface::of_package(&compact);
-    let network = StackEncoder::new(&compact, &surface.topology, Attention::default());
+    let network = StackEncoder::new(&compact, &surface.topology, EncoderSettings::default());
     let anchor = compact.anchor_vertex() as usize;
     let system = PoissonSystem::new(&surface.topology, &surface.weights, &surface.rest, anchor)?;
     let (rotation, stretch) = (f64::from(compact.rotation_scale()), f64::from(compact.stretch_scale()));

@@ -74,7 +74,7 @@ fn error_of(sequence: &MeshSequence, learned: &Learned, test: &[usize]) -> f64 {
         sequence,
         test_shapes: test,
         settings: learned.config.features,
-        attention: learned.config.fit.attention,
+        encoder: learned.config.encoder(),
     };
     let (evaluation, _) = evaluate(&input, &|_| {}).expect("the package plays");
     evaluation.position_projection.e_rms
@@ -242,7 +242,7 @@ fn three_levels_learn_and_play() {
         sequence: &sequence,
         test_shapes: &TEST,
         settings: learned.config.features,
-        attention: learned.config.fit.attention,
+        encoder: learned.config.encoder(),
     };
     let (evaluation, _) = evaluate(&input, &|_| {}).expect("the package plays");
     assert!(evaluation.position_projection.e_rms < SENSIBLE_E_RMS, "{evaluation:?}");

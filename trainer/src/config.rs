@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::components::extract::PruneSettings;
 use crate::components::mix::MixSettings;
+use crate::evaluate::{EncoderSettings, Reading};
 use crate::features::gradient::FeatureSettings;
 use crate::learn::refine::RefineSettings;
 use crate::network::loss::LossSettings;
@@ -256,6 +257,18 @@ impl TrainConfig {
         let config: Self = merged.try_into()?;
         config.check()?;
         Ok(config)
+    }
+
+    /// What the encoder takes from the training: latents of refined components are read by least squares.
+    pub fn encoder(&self) -> EncoderSettings {
+        EncoderSettings {
+            attention: self.fit.attention,
+            reading: if self.refine.rounds > 0 {
+                Reading::LeastSquares
+            } else {
+                Reading::Tied
+            },
+        }
     }
 
     /// The whole configuration as TOML; [`TrainConfig::from_toml`] reads it back unchanged.

@@ -247,7 +247,7 @@ fn measure(
             sequence: input.sequence,
             test_shapes,
             settings: config.features,
-            attention: config.fit.attention,
+            encoder: config.encoder(),
         };
         evaluate(&input, &|done| reporter.advance((before + done) as u64, ""))
     };

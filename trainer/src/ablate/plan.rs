@@ -129,7 +129,7 @@ pub fn variants(groups: &[Group], base: &TrainConfig, quick: bool) -> Vec<Varian
             Group::Counts => {
                 for counts in splits(&base.components, if quick { 2 } else { SPLITS_MAX }) {
                     let name = format!("{} × {}", counts[0], counts[1]);
-                    push(name, Vec::new(), with_components(&base, counts));
+                    push(name, Vec::new(), with_components(base, counts));
                 }
             }
             Group::Reach => {
@@ -185,7 +185,7 @@ pub fn variants(groups: &[Group], base: &TrainConfig, quick: bool) -> Vec<Varian
                     three_levels(base.component_count()),
                 ] {
                     let name = counts.iter().map(usize::to_string).collect::<Vec<_>>().join(" × ");
-                    push(name, Vec::new(), with_components(&base, counts));
+                    push(name, Vec::new(), with_components(base, counts));
                 }
             }
             Group::Recipe => {

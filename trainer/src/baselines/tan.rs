@@ -110,6 +110,7 @@ impl TanSettings {
         config.scaling.rotation_reach = 0.95;
         config.scaling.stretch_weight = 1.0;
         config.mixes.per_step = 0;
+        config.refine.rounds = 0;
         config.start.centres = 1;
         config.prune.least_strength = 0.0;
         config.prune.entries_per_vertex = self.component_count as f64 + 1.0;
@@ -237,7 +238,7 @@ mod tests {
                 sequence: &sequence,
                 test_shapes: &train_shapes[1..],
                 settings: config.features,
-                attention: config.fit.attention,
+                encoder: config.encoder(),
             };
             let (evaluation, _) = evaluate(&input, &|_| ()).expect("measures");
             (evaluation, bytes)

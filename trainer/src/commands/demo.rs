@@ -91,7 +91,7 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<(), Failure> 
         sequence: &sequence,
         test_shapes: &test,
         settings: learned.config.features,
-        attention: learned.config.fit.attention,
+        encoder: learned.config.encoder(),
     };
     let (evaluation, shapes) = evaluate(&input, &|done| console.advance(done as u64, "")).into_diagnostic()?;
 

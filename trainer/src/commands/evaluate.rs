@@ -86,7 +86,7 @@ pub fn run(arguments: &EvaluateArguments, console: &Console) -> Result<(), Failu
         sequence: &sequence,
         test_shapes: &test,
         settings: config.features,
-        attention: config.fit.attention,
+        encoder: config.encoder(),
     };
     let (evaluation, shapes) = evaluate(&input, &|done| console.advance(done as u64, "")).into_diagnostic()?;
     console.finish();

@@ -58,7 +58,7 @@ impl<'b, 'm> FeatureFit<'b, 'm> {
         };
         fit.displacements = fit.displacements_of(basis.directions.clone());
         fit.mean_displacement = fit
-            .displacements_of(vec![fit.from_reference(&basis.mean)])
+            .displacements_of(vec![fit.less_reference(&basis.mean)])
             .swap_remove(0);
         let lower = gram_matrix(&fit.displacements);
         fit.position_gram = DMatrix::from_fn(count, count, |i, j| lower[(i.max(j), i.min(j))]);
@@ -67,7 +67,7 @@ impl<'b, 'm> FeatureFit<'b, 'm> {
 
     /// Weights of the vectors nearest to `samples` (each `[D]`). Shape: `[N][K]`.
     pub fn weights(&self, samples: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        let displacements = self.displacements_of(samples.iter().map(|x| self.from_reference(x)).collect());
+        let displacements = self.displacements_of(samples.iter().map(|x| self.less_reference(x)).collect());
         samples
             .par_iter()
             .zip(&displacements)
@@ -77,7 +77,7 @@ impl<'b, 'm> FeatureFit<'b, 'm> {
 
     fn fit(&self, sample: &[f64], displacement: &[[f32; 3]]) -> Vec<f64> {
         let basis = self.basis;
-        let moved = self.from_reference(sample);
+        let moved = self.less_reference(sample);
         let features = product(&weighted(&moved, self.element_weights, basis.width), &moved);
         let positions = dot(displacement, displacement);
         let position_weight = if positions > features * f64::MIN_POSITIVE {
@@ -107,7 +107,7 @@ impl<'b, 'm> FeatureFit<'b, 'm> {
         factor.solve(&right).iter().copied().collect()
     }
 
-    fn from_reference(&self, features: &[f64]) -> Vec<f64> {
+    fn less_reference(&self, features: &[f64]) -> Vec<f64> {
         features.iter().zip(self.reference).map(|(x, r)| x - r).collect()
     }
 

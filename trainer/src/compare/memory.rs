@@ -4,8 +4,9 @@
 //! Counted, not read off the process's resident set: what earlier methods freed stays resident or not as the C library
 //! pleases, and would be charged to the next one.
 
+use core::alloc::{GlobalAlloc, Layout};
 use core::sync::atomic::{AtomicUsize, Ordering::Relaxed};
-use std::alloc::{GlobalAlloc, Layout, System};
+use std::alloc::System;
 use std::time::Instant;
 
 /// Bytes held, and the most of them.
@@ -15,13 +16,15 @@ struct Counts {
     most: AtomicUsize,
 }
 
-static COUNTS: Counts = Counts::NONE;
+static COUNTS: Counts = Counts::none();
 
 impl Counts {
-    const NONE: Self = Self {
-        held: AtomicUsize::new(0),
-        most: AtomicUsize::new(0),
-    };
+    const fn none() -> Self {
+        Self {
+            held: AtomicUsize::new(0),
+            most: AtomicUsize::new(0),
+        }
+    }
 
     fn grow(&self, bytes: usize) {
         let held = self.held.fetch_add(bytes, Relaxed) + bytes;

@@ -24,6 +24,7 @@ use crate::baselines::splocs::{SplocsSettings, splocs};
 use crate::baselines::tan::{TanSettings, train};
 use crate::baselines::wang::{LengthAngleModel, wang};
 use crate::components::position_modes::keep_linear_algebra_serial;
+use crate::config::TrainConfig;
 use crate::evaluate::{
     EvaluationError, EvaluationInput, FeatureDecoder, FeatureMetric, FeatureProjection, Scores, evaluate, score,
 };
@@ -363,12 +364,16 @@ impl Run<'_, '_> {
         let bench = self.bench;
         let view = CompactView::open(package).map_err(EvaluationError::from)?;
         self.reporter.stage(name, bench.test_shapes.len() as u64);
+        // As the package was trained, which may be elsewhere.
+        let encoder = TrainConfig::from_toml(view.provenance().config)
+            .unwrap_or_else(|_| bench.input.settings.config.clone())
+            .encoder();
         let input = EvaluationInput {
             package,
             sequence: bench.input.sequence,
             test_shapes: &bench.test_shapes,
             settings: bench.input.settings.config.features,
-            attention: bench.input.settings.config.fit.attention,
+            encoder,
         };
         let (evaluation, shapes) = evaluate(&input, &|done| self.reporter.advance(done as u64, ""))?;
         self.round_trip = Some(evaluation.round_trip);

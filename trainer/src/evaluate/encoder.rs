@@ -1,6 +1,7 @@
 //! The network's encoder, evaluated plainly from a compact package: the paper's way to weights (method section 3, number
 //! 1). Nothing is folded here; the decoder's half is the unfolded one, so it checks the folding too.
 
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use sinew_formats::package::{BlockRecord, CompactView, FEATURE_COUNT, GraphConvRecord, NONE};
 
 use crate::{
@@ -16,6 +17,29 @@ pub const MASK_FLOOR: f64 = crate::network::kernel::MASK_FLOOR as f64;
 /// One value of each feature.
 type Features = [f64; FEATURE_COUNT];
 
+/// How a block's latents are read off what its convolution answers.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Reading {
+    /// `z = C h`, the paper's: right where the rows of C are orthonormal, as training keeps them nearly.
+    #[default]
+    Tied,
+    /// `z = (C C^T)^-1 C h`: the same for orthonormal rows, and what is nearest to h for any others. Refined components have
+    /// rows that overlap, and would count twice what they share.
+    LeastSquares,
+}
+
+/// What the encoder takes from how a package was trained.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct EncoderSettings {
+    /// How residuals are shared out among blocks.
+    pub attention: Attention,
+    /// How latents are read.
+    pub reading: Reading,
+}
+
+/// Added to the diagonal of `C C^T` as a share of its mean: rows that repeat each other keep an answer.
+const READING_RIDGE: f64 = 1e-4;
+
 /// The encoder of a package, ready for any number of shapes. V vertices, B blocks, K components.
 #[derive(Debug, Clone)]
 pub struct StackEncoder<'t> {
@@ -24,6 +48,8 @@ pub struct StackEncoder<'t> {
     components: Vec<SparseComponent>,
     /// Attention masks of the components that have a block below them; empty for the others. Shape: `[K][V]`.
     masks: Vec<Vec<f64>>,
+    /// Factors of `C C^T`; nothing where latents are read as they are. Shape: `[B]`.
+    readings: Vec<Option<Cholesky<f64, Dyn>>>,
 }
 
 /// What the encoder says of one shape.
@@ -40,8 +66,8 @@ pub struct Encoding {
 }
 
 impl<'t> StackEncoder<'t> {
-    /// Prepares the masks. `topology` is that of the package ([`crate::bake::Surface`]); `attention` that of its training.
-    pub fn new(package: &CompactView<'_>, topology: &'t Topology, attention: Attention) -> Self {
+    /// Prepares the masks. `topology` is that of the package ([`crate::bake::Surface`]); `settings` those of its training.
+    pub fn new(package: &CompactView<'_>, topology: &'t Topology, settings: EncoderSettings) -> Self {
         let blocks: Vec<BlockRecord> = package.blocks().collect();
         let components = unpack_components(package);
         let mut masks = vec![Vec::new(); components.len()];
@@ -49,7 +75,7 @@ impl<'t> StackEncoder<'t> {
             let members = component_range(block);
             let has_child = |k: usize| blocks.iter().any(|child| child.parent_component == k as u32);
             if members.clone().any(has_child) {
-                let block_masks = match attention {
+                let block_masks = match settings.attention {
                     Attention::Components => attention_masks(topology.vertex_count, &components[members.clone()]),
                     Attention::Equal => {
                         vec![vec![1.0 / members.len() as f64; topology.vertex_count]; members.len()]
@@ -60,8 +86,13 @@ impl<'t> StackEncoder<'t> {
                 }
             }
         }
+        let readings = blocks.iter().map(|block| match settings.reading {
+            Reading::Tied => None,
+            Reading::LeastSquares => factor_of_rows(topology.vertex_count, &components[component_range(block)]),
+        });
         Self {
             topology,
+            readings: readings.collect(),
             blocks,
             components,
             masks,
@@ -76,7 +107,7 @@ impl<'t> StackEncoder<'t> {
         let mut residuals: Vec<Vec<Features>> = Vec::with_capacity(self.blocks.len());
         let mut sum = vec![[0.0; FEATURE_COUNT]; whole.len()];
         let mut root_sum = Vec::new();
-        for block in &self.blocks {
+        for (block, reading) in self.blocks.iter().zip(&self.readings) {
             let input = match block.parent_component {
                 NONE => whole.clone(),
                 parent => {
@@ -86,9 +117,16 @@ impl<'t> StackEncoder<'t> {
             };
             let hidden = convolve(&block.encoder, self.topology, &input);
             let mut blend = vec![[0.0; FEATURE_COUNT]; whole.len()];
-            for k in component_range(block) {
-                weights[k] = self.latent(k, &hidden);
-                self.blend(k, weights[k], &mut blend);
+            let mut latents = DVector::from_iterator(
+                component_range(block).len(),
+                component_range(block).map(|k| self.latent(k, &hidden)),
+            );
+            if let Some(reading) = reading {
+                reading.solve_mut(&mut latents);
+            }
+            for (k, &latent) in component_range(block).zip(&latents) {
+                weights[k] = latent;
+                self.blend(k, latent, &mut blend);
             }
             let output = convolve(&block.decoder, self.topology, &blend);
             residuals.push(difference(&input, &output));
@@ -148,6 +186,33 @@ impl<'t> StackEncoder<'t> {
 fn component_range(block: &BlockRecord) -> core::ops::Range<usize> {
     let first = block.first_component as usize;
     first..first + block.component_count as usize
+}
+
+/// `C C^T` of a block, factored. Sparse rows name their vertices, which pass through one row of `[V]`.
+fn factor_of_rows(vertex_count: usize, components: &[SparseComponent]) -> Option<Cholesky<f64, Dyn>> {
+    let count = components.len();
+    let mut gram = DMatrix::zeros(count, count);
+    let mut row = vec![[0.0; FEATURE_COUNT]; vertex_count];
+    for (i, component) in components.iter().enumerate() {
+        row.fill([0.0; FEATURE_COUNT]);
+        for (&v, value) in component.vertices.iter().zip(&component.values) {
+            row[v as usize] = value.map(f64::from);
+        }
+        for (j, other) in components.iter().enumerate() {
+            let entries = other.vertices.iter().zip(&other.values);
+            gram[(i, j)] = entries
+                .map(|(&v, value)| {
+                    let own = &row[v as usize];
+                    (0..FEATURE_COUNT).map(|c| own[c] * f64::from(value[c])).sum::<f64>()
+                })
+                .sum();
+        }
+    }
+    let ridge = READING_RIDGE * gram.diagonal().sum() / count.max(1) as f64;
+    for k in 0..count {
+        gram[(k, k)] += ridge;
+    }
+    Cholesky::new(gram)
 }
 
 /// `AM_k,v = (|C_k,v|^2 + f) / (sum_k |C_k,v|^2 + K f)` with `f = MASK_FLOOR / V`; sums to one over the block's components.

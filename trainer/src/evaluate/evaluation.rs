@@ -12,8 +12,8 @@ use sinew_formats::{
 use sinew_runtime::{Basis, Workspace, WorkspaceError, WorkspaceLayout};
 
 use super::{
-    Encoding, FeatureDecoder, FeatureMetric, FeatureProjection, PlayError, Player, ScoreError, Scores, StackEncoder,
-    project_positions, score,
+    EncoderSettings, Encoding, FeatureDecoder, FeatureMetric, FeatureProjection, PlayError, Player, ScoreError, Scores,
+    StackEncoder, project_positions, score,
 };
 use crate::{
     bake::{BakeError, Surface, bake},
@@ -25,7 +25,6 @@ use crate::{
         scaler::FeatureScaler,
     },
     mesh::sparse_factor::FactorError,
-    network::attention::Attention,
 };
 
 /// What is measured, and on what.
@@ -39,8 +38,8 @@ pub struct EvaluationInput<'a> {
     pub test_shapes: &'a [usize],
     /// Settings of the features, those of the training.
     pub settings: FeatureSettings,
-    /// How the network shared residuals out, as in the training.
-    pub attention: Attention,
+    /// What the encoder takes from the training.
+    pub encoder: EncoderSettings,
 }
 
 /// The figures, as `sinew evaluate --json` prints them.
@@ -173,7 +172,7 @@ pub fn evaluate(
     let bench = Bench::new(&package, &baked)?;
     let surface = &bench.surface;
     let fit = GradientFit::new(&surface.topology, &surface.rest, &input.settings);
-    let encoder = StackEncoder::new(&package, &surface.topology, input.attention);
+    let encoder = StackEncoder::new(&package, &surface.topology, input.encoder);
     let projection = bench.projection();
     let done = AtomicUsize::new(0);
     let results: Vec<ShapeResult> = input

@@ -2,9 +2,8 @@
 
 use sinew_formats::package::{BakedView, CompactView, FEATURE_COUNT};
 
-use super::{FeatureDecoder, StackEncoder};
+use super::{EncoderSettings, FeatureDecoder, StackEncoder};
 use crate::bake::{Surface, bake, bake_bytes, fixture};
-use crate::network::attention::Attention;
 
 /// Half precision keeps 11 binary digits of each folded value; a vertex sums a handful.
 const HALF_TOLERANCE: f64 = 2e-3;
@@ -21,7 +20,7 @@ fn folded_decoder_is_the_unfolded_one() {
     let baked = bake(&compact).unwrap();
     let folded = FeatureDecoder::new(&BakedView::open(&baked).unwrap()).decode_all(&WEIGHTS);
     let surface = Surface::of_package(&compact);
-    let unfolded = StackEncoder::new(&compact, &surface.topology, Attention::default()).decode(&WEIGHTS);
+    let unfolded = StackEncoder::new(&compact, &surface.topology, EncoderSettings::default()).decode(&WEIGHTS);
     let largest = unfolded
         .as_flattened()
         .iter()

@@ -15,7 +15,7 @@ mod position_projection;
 mod scores;
 mod sted;
 
-pub use encoder::{Encoding, MASK_FLOOR, StackEncoder};
+pub use encoder::{EncoderSettings, Encoding, MASK_FLOOR, Reading, StackEncoder};
 pub use erms::NormalisedPair;
 pub use evaluation::{
     ComponentCounts, Evaluation, EvaluationError, EvaluationInput, MaxPercentageError, Reconstructions, evaluate,

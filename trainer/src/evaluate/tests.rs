@@ -10,7 +10,6 @@ use super::*;
 use crate::{
     bake::{Surface, bake_bytes, fixture},
     features::{align::widened, gradient::FeatureSettings, reconstruct::PoissonSystem},
-    network::attention::Attention,
 };
 
 const WEIGHTS: [f64; 7] = [0.8, -0.5, 1.0, 0.3, -0.9, 0.6, 0.4];
@@ -97,7 +96,7 @@ fn evaluation_ranks_the_three_ways_and_names_its_fields() {
         sequence: &sequence,
         test_shapes: &[1, 2],
         settings: FeatureSettings::default(),
-        attention: Attention::default(),
+        encoder: EncoderSettings::default(),
     };
     let (evaluation, reconstructions) = evaluate(&input, &|_| ()).unwrap();
     assert_eq!((evaluation.shapes, evaluation.vertices), (2, fixture::mesh().0.len()));
@@ -231,7 +230,7 @@ fn encoder_agrees_with_a_dense_one() {
             .zip(&left)
             .for_each(|((total, x), r)| *total -= x - r);
     }
-    let encoding = StackEncoder::new(&package, &surface.topology, Attention::default()).encode(&features);
+    let encoding = StackEncoder::new(&package, &surface.topology, EncoderSettings::default()).encode(&features);
     assert!(
         largest_difference(&encoding.weights, &weights) < 1e-9,
         "{:?} {weights:?}",
@@ -240,4 +239,27 @@ fn encoder_agrees_with_a_dense_one() {
     assert!((encoding.root_residual_energy / root_energy - 1.0).abs() < 1e-9);
     let energy: f64 = total.iter().map(|r| r * r).sum();
     assert!((encoding.residual_energy / energy - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn rows_that_overlap_are_read_by_least_squares() {
+    let package = fixture::compact(21, false);
+    let package = CompactView::open(&package).unwrap();
+    let surface = Surface::of_package(&package);
+    let features: Vec<_> = StackEncoder::new(&package, &surface.topology, EncoderSettings::default())
+        .decode(&WEIGHTS)
+        .iter()
+        .map(|x| x.map(|x| x as f32))
+        .collect();
+    let missed = |reading| {
+        let settings = EncoderSettings {
+            reading,
+            ..EncoderSettings::default()
+        };
+        StackEncoder::new(&package, &surface.topology, settings)
+            .encode(&features)
+            .residual_energy
+    };
+    let (tied, least_squares) = (missed(Reading::Tied), missed(Reading::LeastSquares));
+    assert!(least_squares < 0.5 * tied, "{least_squares} {tied}");
 }

@@ -10,8 +10,7 @@ use super::prepare::Prepared;
 use crate::bake::{Surface, bake};
 use crate::components::extract::LearnedBasis;
 use crate::config::{TrainConfig, ValidationSettings};
-use crate::evaluate::{NormalisedPair, StackEncoder};
-use crate::network::attention::Attention;
+use crate::evaluate::{EncoderSettings, NormalisedPair, StackEncoder};
 use crate::network::weights::StackWeights;
 use crate::training::fit::HistoryPoint;
 
@@ -55,7 +54,7 @@ impl HeldOut {
         let basis = draft(prepared, config, weights, &self.rest_of(prepared.network.len()))?;
         let inputs: Vec<&[[f32; 9]]> = self.shapes.iter().map(|&m| prepared.network[m].as_slice()).collect();
         let truth = self.shapes.iter().map(|&m| prepared.aligned[m].clone()).collect();
-        Ok(encoder_error(&basis, config.fit.attention, &inputs, Some(truth))?)
+        Ok(encoder_error(&basis, config.encoder(), &inputs, Some(truth))?)
     }
 }
 
@@ -63,7 +62,7 @@ impl HeldOut {
 /// positions by the solve alone.
 pub fn encoder_error(
     basis: &LearnedBasis,
-    attention: Attention,
+    settings: EncoderSettings,
     inputs: &[&[[f32; 9]]],
     truth: Option<Vec<Vec<[f32; 3]>>>,
 ) -> Result<f32, PackageError> {
@@ -72,7 +71,7 @@ pub fn encoder_error(
     let baked = bake(&view)?;
     let opened = Basis::open(&baked)?;
     let surface = Surface::of_package(&view);
-    let encoder = StackEncoder::new(&view, &surface.topology, attention);
+    let encoder = StackEncoder::new(&view, &surface.topology, settings);
     let codes: Vec<Vec<f64>> = inputs.par_iter().map(|shape| encoder.encode(shape).weights).collect();
     let played = with_players(&opened, &codes, |player, code| Ok(player.play(code)?.to_vec()))?;
     let truth = match truth {

@@ -154,7 +154,7 @@ fn measure_ranges(
     let compact = basis.write_draft()?;
     let view = compact.view()?;
     let surface = Surface::of_package(&view);
-    let encoder = StackEncoder::new(&view, &surface.topology, config.fit.attention);
+    let encoder = StackEncoder::new(&view, &surface.topology, config.encoder());
     let codes = with_range_shapes(prepared, config, shapes, |shape| encoder.encode(shape).weights);
     set_ranges(basis, &codes);
     Ok(())

@@ -68,7 +68,7 @@ fn start(
             return Ok(weights);
         }
         let basis = package::draft(prepared, config, &weights, shapes)?;
-        let error = encoder_error(&basis, config.fit.attention, &unseen, None)?;
+        let error = encoder_error(&basis, config.encoder(), &unseen, None)?;
         if best.as_ref().is_none_or(|(least, _)| error < *least) {
             best = Some((error, weights));
         }
