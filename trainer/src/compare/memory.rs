@@ -138,7 +138,7 @@ mod tests {
 
     #[test]
     fn counts_the_most_that_is_held_at_once() {
-        static OWN: Counts = Counts::NONE;
+        static OWN: Counts = Counts::none();
         assert_eq!(PeakMemory::of(&OWN).bytes(), None, "nobody counts");
         OWN.grow(100);
         let peak = PeakMemory::of(&OWN);
