@@ -2,7 +2,7 @@
 //! on the same unseen shapes by the same figures.
 //!
 //! Path of data: sequence, split -> `Bench` (aligned shapes, features) -> [`crate::baselines`] and this
-//! project's own training -> weights of unseen shapes, each method's own way ([`fitting`]) -> [`Comparison`].
+//! project's own training -> weights of unseen shapes, each method's own way (`fitting`, `feature_fit`) -> [`Comparison`].
 
 mod bench;
 mod control_points;

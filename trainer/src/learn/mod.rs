@@ -1,8 +1,8 @@
 //! The whole training job: from a sequence to a compact package. Everything the command does between reading files and
 //! writing one is here, so that tests and other programs can do it too.
 //!
-//! Path of data: [`review`] (which shapes are of use) -> [`prepare`] (topology, features, distances) -> choose how to mix and
-//! where to start, by held-out shapes ([`hold_out`]) -> fit, and fit again on all shapes where they are few -> [`refine`] for
+//! Path of data: [`mod@review`] (which shapes are of use) -> [`prepare`] (topology, features, distances) -> choose how to mix and
+//! where to start, by held-out shapes ([`hold_out`]) -> fit, and fit again on all shapes where they are few -> [`mod@refine`] for
 //! positions -> [`package`] (extract, prune, measure).
 
 pub mod hold_out;
