@@ -41,6 +41,20 @@ impl LinearBasis {
         elements.map(|x| x.iter().map(|x| x * x).sum()).collect()
     }
 
+    /// Products of all directions, elements weighted (`[E]`). Shape: `[K][K]`.
+    pub(crate) fn gram(&self, element_weights: &[f64]) -> DMatrix<f64> {
+        let count = self.directions.len();
+        let rows: Vec<Vec<f64>> = (0..count)
+            .into_par_iter()
+            .map(|k| {
+                let weighted = weighted(&self.directions[k], element_weights, self.width);
+                let others = self.directions[..=k].iter();
+                others.map(|other| product(&weighted, other)).collect()
+            })
+            .collect();
+        DMatrix::from_fn(count, count, |i, j| rows[i.max(j)][i.min(j)])
+    }
+
     /// Directions that are not zero.
     pub fn used_count(&self) -> usize {
         self.directions
@@ -62,17 +76,7 @@ impl<'b> LinearProjection<'b> {
     /// Misfits count by `element_weights`, shape `[E]`, positive.
     pub fn new(basis: &'b LinearBasis, element_weights: &[f64]) -> Self {
         let component_count = basis.directions.len();
-        let rows: Vec<Vec<f64>> = (0..component_count)
-            .into_par_iter()
-            .map(|k| {
-                let weighted = weighted(&basis.directions[k], element_weights, basis.width);
-                basis.directions[..=k]
-                    .iter()
-                    .map(|other| product(&weighted, other))
-                    .collect()
-            })
-            .collect();
-        let mut gram = DMatrix::from_fn(component_count, component_count, |i, j| rows[i.max(j)][i.min(j)]);
+        let mut gram = basis.gram(element_weights);
         let mean = gram.diagonal().sum() / component_count.max(1) as f64;
         for k in 0..component_count {
             gram[(k, k)] += RIDGE * mean;

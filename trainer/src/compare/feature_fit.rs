@@ -37,14 +37,6 @@ impl<'b, 'm> FeatureFit<'b, 'm> {
         model: &'b (dyn Fn(LinearBasis) -> Box<dyn Model + 'm> + Sync),
     ) -> Self {
         let count = basis.directions.len();
-        let rows: Vec<Vec<f64>> = (0..count)
-            .into_par_iter()
-            .map(|k| {
-                let weighted = weighted(&basis.directions[k], element_weights, basis.width);
-                let others = basis.directions[..=k].iter();
-                others.map(|other| product(&weighted, other)).collect()
-            })
-            .collect();
         let mut fit = Self {
             basis,
             element_weights,
@@ -53,7 +45,7 @@ impl<'b, 'm> FeatureFit<'b, 'm> {
             rigid: rigid_directions(rest),
             displacements: Vec::new(),
             mean_displacement: Vec::new(),
-            feature_gram: DMatrix::from_fn(count, count, |i, j| rows[i.max(j)][i.min(j)]),
+            feature_gram: basis.gram(element_weights),
             position_gram: DMatrix::zeros(count, count),
         };
         fit.displacements = fit.displacements_of(basis.directions.clone());
