@@ -226,7 +226,7 @@ impl Default for ValidationSettings {
 #[non_exhaustive]
 pub enum ConfigError {
     /// Not TOML, an unknown key, or a value of the wrong type.
-    #[error("{0}")]
+    #[error(transparent)]
     Syntax(#[from] toml::de::Error),
     /// A value out of its range.
     #[error("`{key}` is {found}, but must be {expected}")]

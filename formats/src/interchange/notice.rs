@@ -54,6 +54,9 @@ pub enum Notice {
 impl fmt::Display for Notice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Notice::IgnoredFiles { count: 1, example } => {
+                write!(f, "`{example}` of the folder is no shape and was ignored")
+            }
             Notice::IgnoredFiles { count, example } => {
                 write!(
                     f,

@@ -12,7 +12,7 @@ use sinew_trainer::learn::LearnError;
 use sinew_trainer::report::ablation_page::AblationPage;
 
 use super::console::Console;
-use super::{Failure, check_output, chosen_shapes, load_sequence, parse_duration, read_config};
+use super::{Failure, check_output, chosen_shapes, load_sequence, make_folder, parse_duration, read_config};
 
 /// Shapes that a quick ablation measures at most.
 const QUICK_SHAPES: usize = 12;
@@ -72,9 +72,7 @@ pub fn run(arguments: &AblateArguments, console: &Console) -> Result<(), Failure
         check_output(path)?;
     }
     if let Some(folder) = &arguments.report {
-        std::fs::create_dir_all(folder)
-            .into_diagnostic()
-            .wrap_err_with(|| format!("cannot make the folder {}", folder.display()))?;
+        make_folder(folder)?;
         check_output(&folder.join("index.html"))?;
     }
     let sequence = load_sequence(&arguments.sequence, console)?;

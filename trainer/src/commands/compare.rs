@@ -12,7 +12,7 @@ use sinew_trainer::report::compare_page::comparison_page;
 
 use super::console::Console;
 use super::evaluate::config_of;
-use super::{Failure, check_output, chosen_shapes, load_package, load_sequence};
+use super::{Failure, check_output, chosen_shapes, load_package, load_sequence, make_folder};
 
 /// Arguments of `sinew compare`.
 #[derive(Args)]
@@ -69,9 +69,7 @@ pub fn run(arguments: &CompareArguments, console: &Console) -> Result<(), Failur
         check_output(path)?;
     }
     if let Some(folder) = &arguments.report {
-        std::fs::create_dir_all(folder)
-            .into_diagnostic()
-            .wrap_err_with(|| format!("cannot make the folder {}", folder.display()))?;
+        make_folder(folder)?;
         check_output(&folder.join("index.html"))?;
     }
     let sequence = load_sequence(&arguments.sequence, console)?;

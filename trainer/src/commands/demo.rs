@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
-use miette::{IntoDiagnostic, WrapErr};
+use miette::IntoDiagnostic;
 use sinew_formats::interchange::write_sequence_npy;
 use sinew_formats::package::{CompactView, save_package};
 use sinew_trainer::bake::{BakeOptions, bake_with};
@@ -16,9 +16,9 @@ use sinew_trainer::learn::{LearnError, Reporter, RunOptions, learn};
 use sinew_trainer::report::illustrate::{Subject as ReportSubject, illustrate};
 use sinew_trainer::synthesize::{Settings, Subject};
 
-use super::Failure;
 use super::console::Console;
 use super::evaluate::{print_table, test_shapes};
+use super::{Failure, make_folder};
 
 /// Shapes of the demonstration; one in ten is trained on.
 const FRAMES: usize = 101;
@@ -45,9 +45,7 @@ pub struct DemoArguments {
 pub fn run(arguments: &DemoArguments, console: &Console) -> Result<(), Failure> {
     let started = Instant::now();
     let folder = &arguments.output;
-    std::fs::create_dir_all(folder)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("cannot make the folder {}", folder.display()))?;
+    make_folder(folder)?;
     console.catch_interrupts();
     console.stage("synthesizing a creature", 1);
     let settings = Settings {

@@ -11,14 +11,14 @@ use sinew_trainer::evaluate::{Evaluation, EvaluationInput, Scores, evaluate};
 use sinew_trainer::learn::Reporter;
 
 use super::console::Console;
-use super::{Failure, chosen_shapes, load_package, load_sequence};
+use super::{Failure, chosen_shapes, load_package, load_sequence, make_folder};
 
 /// Arguments of `sinew evaluate`.
 #[derive(Args)]
 #[command(
     after_help = "Three ways to find the weights of an unseen shape, all with the same components and all played by the runtime:
   encoder              the network's own answer, one pass
-  feature projection   least squares on features and, to first order, on what they do to positions, from there
+  feature projection   least squares on features and, to first order, positions, from there
   position projection  Gauss-Newton on positions, from there: what the components can do
 and the round trip: features to positions without components, below which no figure can fall.
 
@@ -91,9 +91,7 @@ pub fn run(arguments: &EvaluateArguments, console: &Console) -> Result<(), Failu
     let (evaluation, shapes) = evaluate(&input, &|done| console.advance(done as u64, "")).into_diagnostic()?;
     console.finish();
     if let Some(folder) = &arguments.save {
-        std::fs::create_dir_all(folder)
-            .into_diagnostic()
-            .wrap_err_with(|| format!("cannot make the folder {}", folder.display()))?;
+        make_folder(folder)?;
         let arrays = [
             ("truth.npy", &shapes.truth),
             ("encoder.npy", &shapes.encoder),

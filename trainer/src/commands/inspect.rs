@@ -17,14 +17,15 @@ use super::{Failure, Standing, load_package};
 /// Arguments of `sinew inspect`.
 #[derive(Args)]
 #[command(
-    after_help = "scale      how far from its centre a component was asked to stay, as a share of the longest distance on the surface
-strength   mean displacement of the vertices it moves, at its farther stop, as a share of the bounding box's diagonal
+    after_help = "scale      how far from its centre it was asked to stay, over the longest distance on the surface
+strength   mean displacement of what it moves at its farther stop, over the bounding box's diagonal
 locality   share of its energy inside `scale`
 range      weights seen on the training shapes and their mixes; the stops of the control
-mirror     what does the same on the other side of the mirror plane, `self` where that is the component itself; with a minus
-           where it takes the opposite weight
-label      where it acts and how: its side (where the rest shape has a mirror plane), back or front, low or high; then
-           swing     about one axis, one way         bend    about one axis, here one way and there the other
+mirror     what does the same on the other side of the mirror plane, `self` where that is the
+           component itself; with a minus where it takes the opposite weight
+label      where it acts and how: its side (where the rest shape has a mirror plane), back or front,
+           low or high; then
+           swing     about one axis, one way         bend    about one axis, both ways
            twist     about the length of the region  turn    about several axes
            stretch, squash (mostly one way), swell, shrink (all around), at the farther stop
 

@@ -112,6 +112,13 @@ fn check_output(path: &Path) -> Result<(), Report> {
         .wrap_err_with(|| format!("cannot write into the folder {}", folder.display()))
 }
 
+/// Makes a folder for output, where it is not there yet.
+fn make_folder(folder: &Path) -> Result<(), Report> {
+    std::fs::create_dir_all(folder)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot make the folder {}", folder.display()))
+}
+
 /// Which shapes are for training, from the two ways to say so.
 fn chosen_shapes(every: usize, list: Option<&Path>, shape_count: usize) -> Result<Vec<usize>, Report> {
     let Some(list) = list else {

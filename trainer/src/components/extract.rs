@@ -191,6 +191,14 @@ impl LearnedBasis {
         self.blocks.iter_mut().flat_map(|block| &mut block.components)
     }
 
+    /// Writes the rows, rounded and cut as they are here, back into the `weights` they were read from.
+    pub fn put_rows_into(&self, weights: &mut StackWeights) {
+        for (block, own) in weights.blocks_mut().zip(&self.blocks) {
+            let rows = own.components.iter().flat_map(|component| component.row.as_flattened());
+            block.components = rows.copied().collect();
+        }
+    }
+
     /// Cuts the faint parts of all components until as many are left as [`PruneSettings`] allow: those that
     /// change features least when their control stands at its farther stop, so that weak components lose more than
     /// strong ones. Ranges must be known; centres and localities are measured anew.

@@ -155,7 +155,9 @@ fn measure_ranges(
     let view = compact.view()?;
     let surface = Surface::of_package(&view);
     let encoder = StackEncoder::new(&view, &surface.topology, config.encoder());
-    let codes = with_range_shapes(prepared, config, shapes, |shape| encoder.encode(shape).weights);
+    let mixes = range_mixes(prepared, config, shapes);
+    let shapes = range_shapes(prepared, shapes, &mixes);
+    let codes: Vec<Vec<f64>> = shapes.par_iter().map(|shape| encoder.encode(shape).weights).collect();
     set_ranges(basis, &codes);
     Ok(())
 }
@@ -166,34 +168,45 @@ fn measure_final_ranges(
     prepared: &Prepared,
     config: &TrainConfig,
 ) -> Result<(), PackageError> {
+    let all: Vec<usize> = (0..prepared.network.len()).collect();
+    let mixes = range_mixes(prepared, config, &all);
+    let (_, codes) = project(basis, prepared, &range_shapes(prepared, &all, &mixes))?;
+    set_ranges(basis, &codes);
+    Ok(())
+}
+
+/// Weights of `shapes` (each `[V]`, network units) by the feature projection of a basis, and the decoder that they are for.
+pub(super) fn project(
+    basis: &LearnedBasis,
+    prepared: &Prepared,
+    shapes: &[&[[f32; 9]]],
+) -> Result<(FeatureDecoder, Vec<Vec<f64>>), PackageError> {
     let compact = basis.write_draft()?;
     let baked = bake(&compact.view()?)?;
     let decoder = FeatureDecoder::new(&BakedView::open(&baked)?);
     let areas: Vec<f64> = prepared.areas.iter().map(|&area| f64::from(area)).collect();
     let metric = FeatureMetric::new(&prepared.system, prepared.scaler.scales(), &areas);
     let projection = FeatureProjection::new(&decoder, metric);
-    let all: Vec<usize> = (0..prepared.network.len()).collect();
-    let rest = vec![0.0; decoder.component_count()];
-    let codes = with_range_shapes(prepared, config, &all, |shape| projection.weights(shape, rest.clone()));
-    set_ranges(basis, &codes);
-    Ok(())
+    let start = vec![0.0; decoder.component_count()];
+    let codes = shapes.par_iter().map(|shape| projection.weights(shape, start.clone()));
+    let codes = codes.collect();
+    drop(projection);
+    Ok((decoder, codes))
 }
 
-/// `job` of the given training shapes and of mixes of them, in their order.
-fn with_range_shapes(
-    prepared: &Prepared,
-    config: &TrainConfig,
-    shapes: &[usize],
-    job: impl Fn(&[[f32; 9]]) -> Vec<f64> + Sync,
-) -> Vec<Vec<f64>> {
-    let mixes = match config.mixes.per_step {
+/// Mixes whose weights count for the stops of the controls. Shape: flat `[n][V][9]`.
+fn range_mixes(prepared: &Prepared, config: &TrainConfig, shapes: &[usize]) -> Vec<f32> {
+    match config.mixes.per_step {
         0 => Vec::new(),
         _ => mixer(prepared, shapes, &config.mixes, config.seed).mixes(NUMBER_OF_RANGE_MIXES, RANGE_MIXES),
-    };
-    let mixes: Vec<&[[f32; 9]]> = mixes.as_chunks::<9>().0.chunks(prepared.rest.len()).collect();
+    }
+}
+
+/// The given training shapes, then the mixes of them.
+fn range_shapes<'a>(prepared: &'a Prepared, shapes: &[usize], mixes: &'a [f32]) -> Vec<&'a [[f32; 9]]> {
+    let mixes = mixes.as_chunks::<9>().0.chunks(prepared.rest.len());
     let posed = shapes.iter().map(|&m| prepared.network[m].as_slice());
-    let inputs: Vec<&[[f32; 9]]> = posed.chain(mixes).collect();
-    inputs.par_iter().map(|shape| job(shape)).collect()
+    posed.chain(mixes).collect()
 }
 
 fn set_ranges(basis: &mut LearnedBasis, codes: &[Vec<f64>]) {

@@ -8,15 +8,13 @@
 use nalgebra::{Cholesky, DMatrix, SMatrix};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use sinew_formats::package::{BakedView, FEATURE_COUNT, GraphConvRecord};
+use sinew_formats::package::{FEATURE_COUNT, GraphConvRecord};
 
-use super::package::{PackageError, draft};
+use super::package::{PackageError, draft, project};
 use super::prepare::Prepared;
 use super::stages::mixer;
 use super::{LearnError, Reporter};
-use crate::bake::bake;
 use crate::config::TrainConfig;
-use crate::evaluate::{FeatureDecoder, FeatureMetric, FeatureProjection};
 use crate::network::weights::StackWeights;
 
 /// How components are refined for positions.
@@ -84,22 +82,9 @@ fn turn(
 ) -> Result<(), PackageError> {
     let vertex_count = weights.vertex_count;
     let cut = draft(prepared, config, weights, shapes)?;
-    for (block, cut) in weights.blocks_mut().zip(&cut.blocks) {
-        let rows = cut.components.iter().flat_map(|component| component.row.as_flattened());
-        block.components = rows.copied().collect();
-    }
-    let compact = cut.write_draft()?;
-    let baked = bake(&compact.view()?)?;
-    let decoder = FeatureDecoder::new(&BakedView::open(&baked)?);
-    let areas: Vec<f64> = prepared.areas.iter().map(|&area| f64::from(area)).collect();
-    let metric = FeatureMetric::new(&prepared.system, prepared.scaler.scales(), &areas);
-    let projection = FeatureProjection::new(&decoder, metric);
-
+    cut.put_rows_into(weights);
     let samples: Vec<&[[f32; FEATURE_COUNT]]> = mixes.as_chunks::<FEATURE_COUNT>().0.chunks(vertex_count).collect();
-    let codes: Vec<Vec<f64>> = samples
-        .par_iter()
-        .map(|sample| projection.weights(sample, vec![0.0; decoder.component_count()]))
-        .collect();
+    let (decoder, codes) = project(&cut, prepared, &samples)?;
     let residuals: Vec<Vec<[f32; FEATURE_COUNT]>> = samples
         .par_iter()
         .zip(&codes)

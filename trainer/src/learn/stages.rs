@@ -98,16 +98,7 @@ fn start_of_seed(
     };
     let mut weights = closed_form_start(&input, &|v| prepared.distances(v));
     // The supports that the fit keeps are those of the package.
-    let cut = package::draft(prepared, config, &weights, shapes)?;
-    let rows = weights.levels.iter_mut().flat_map(|level| &mut level.blocks);
-    for (block, cut) in rows.zip(&cut.blocks) {
-        block.components = cut
-            .components
-            .iter()
-            .flat_map(|component| component.row.as_flattened())
-            .copied()
-            .collect();
-    }
+    package::draft(prepared, config, &weights, shapes)?.put_rows_into(&mut weights);
     Ok(weights)
 }
 
