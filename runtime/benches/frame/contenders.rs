@@ -54,6 +54,7 @@ impl Contenders {
         contenders.extend(morphs(subject));
         contenders.push(skinning(subject));
         contenders.extend(solvers(subject));
+        contenders.push(machine());
         then(&mut contenders);
     }
 }
@@ -113,6 +114,22 @@ fn playing<'c>(
         name,
         role: Role::Measured,
         run: Box::new(run),
+    }
+}
+
+/// The machine's own unrest: arithmetic in registers, the same every time.
+fn machine<'c>() -> Contender<'c> {
+    const STEPS: u32 = 400_000;
+    Contender {
+        name: "nothing but arithmetic in registers".into(),
+        role: Role::Measured,
+        run: Box::new(|round| {
+            let mut x = black_box(round as u32);
+            for _ in 0..STEPS {
+                x = black_box(x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223));
+            }
+            black_box(x);
+        }),
     }
 }
 

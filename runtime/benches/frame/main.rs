@@ -3,8 +3,9 @@
 //!
 //! Every contender of a subject takes its turn in every round, so that a slow moment of the machine hits all alike; what is
 //! quoted is the median CPU time of one thread, and its ratio to the fastest dense loop over 60 morph targets. Arguments:
-//! `quick` for fewer rounds, `tail` for ten thousand, any other word for the subjects whose names hold it. `SINEW_DATA` names a folder of sequences: its
-//! horse is then played instead of the creature; `SINEW_PACKAGE` names a trained compact package to play besides.
+//! `quick` for fewer rounds, `tail` for ten thousand in a row, any other word for the subjects whose names hold it. `SINEW_DATA`
+//! names a folder of sequences: its horse is then played instead of the creature; `SINEW_PACKAGE` names a trained compact package
+//! to play besides.
 
 mod contenders;
 mod measure;
@@ -84,6 +85,9 @@ fn play(subject: &Subject, settings: Settings) {
     measure::opening(subject);
     Contenders::of(subject, |contenders| {
         for cold in [false, true] {
+            if cold && settings.cold_rounds == 0 {
+                continue;
+            }
             Contest {
                 contenders,
                 settings,

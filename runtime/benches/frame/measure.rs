@@ -12,8 +12,10 @@ use sinew_runtime::{Basis, Controls, Frame, Workspace, WorkspaceLayout};
 pub struct Settings {
     /// Rounds with warm caches.
     pub warm_rounds: usize,
-    /// Rounds with cold ones.
+    /// Rounds with cold ones; none where zero.
     pub cold_rounds: usize,
+    /// Whether every contender plays all its warm rounds in a row, as in a show, instead of taking turns.
+    pub in_a_row: bool,
 }
 
 impl Settings {
@@ -21,16 +23,19 @@ impl Settings {
     pub const FULL: Self = Self {
         warm_rounds: 2000,
         cold_rounds: 60,
+        in_a_row: false,
     };
-    /// A tail to be quoted.
+    /// A tail to be quoted: of frames that follow each other.
     pub const TAIL: Self = Self {
         warm_rounds: 10_000,
-        cold_rounds: 20,
+        cold_rounds: 0,
+        in_a_row: true,
     };
     /// Medians need hundreds.
     pub const QUICK: Self = Self {
         warm_rounds: 200,
         cold_rounds: 20,
+        in_a_row: false,
     };
 }
 
@@ -77,7 +82,18 @@ impl Contest<'_, '_> {
         };
         let mut flush = vec![1_u64; if self.cold { FLUSH_WORDS } else { 0 }];
         let mut samples: Vec<Vec<f64>> = vec![Vec::with_capacity(rounds); self.contenders.len()];
-        for round in 0..rounds {
+        let timed = |contender: &mut Contender<'_>, round: usize| {
+            let start = ThreadTime::now();
+            (contender.run)(round);
+            start.elapsed().as_secs_f64() * 1e6
+        };
+        let in_a_row = self.settings.in_a_row && !self.cold;
+        if in_a_row {
+            for (contender, samples) in self.contenders.iter_mut().zip(&mut samples) {
+                samples.extend((0..rounds).map(|round| timed(contender, round)));
+            }
+        }
+        for round in if in_a_row { 0..0 } else { 0..rounds } {
             for (contender, samples) in self.contenders.iter_mut().zip(&mut samples) {
                 if self.cold {
                     flush.iter_mut().for_each(|word| *word = word.wrapping_mul(3));
@@ -86,9 +102,7 @@ impl Contest<'_, '_> {
                     // Its data in its caches again, after the others had them.
                     (contender.run)(round + rounds);
                 }
-                let start = ThreadTime::now();
-                (contender.run)(round);
-                samples.push(start.elapsed().as_secs_f64() * 1e6);
+                samples.push(timed(contender, round));
             }
         }
         samples
@@ -102,13 +116,18 @@ impl Contest<'_, '_> {
             .map(|(_, samples)| quantile(samples, 0.5))
             .fold(f64::INFINITY, f64::min);
         let caches = if self.cold { "cold" } else { "warm" };
-        println!("{caches} caches, {rounds} rounds, microseconds of CPU");
-        println!("{:>44}  {:>8} {:>8} {:>8} {:>8}", "", "p50", "p99", "max", "ratio");
+        let order = if in_a_row { "rounds in a row each" } else { "rounds" };
+        println!("{caches} caches, {rounds} {order}, microseconds of CPU");
+        println!(
+            "{:>44}  {:>8} {:>8} {:>8} {:>8} {:>8}",
+            "", "p50", "p99", "max", "p99/p50", "ratio"
+        );
         for (contender, samples) in self.contenders.iter().zip(&samples) {
             let [p50, p99, max] = [0.5, 0.99, 1.0].map(|q| quantile(samples, q));
             println!(
-                "{:>44}  {p50:8.0} {p99:8.0} {max:8.0} {:8.2}",
+                "{:>44}  {p50:8.0} {p99:8.0} {max:8.0} {:8.2} {:8.2}",
                 contender.name,
+                p99 / p50,
                 p50 / yardstick
             );
         }
