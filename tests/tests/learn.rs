@@ -133,6 +133,7 @@ fn unseen_shapes_are_played_from_few_components() {
         package: &learned.package,
         sequence: &sequence,
         test_shapes: &[1, 3, 5, 7, 9, 11, 13],
+        trained_shapes: &[],
         settings: learned.config.features,
         encoder: learned.config.encoder(),
     };

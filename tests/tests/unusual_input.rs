@@ -73,6 +73,7 @@ fn error_of(sequence: &MeshSequence, learned: &Learned, test: &[usize]) -> f64 {
         package: &learned.package,
         sequence,
         test_shapes: test,
+        trained_shapes: &[],
         settings: learned.config.features,
         encoder: learned.config.encoder(),
     };
@@ -241,6 +242,7 @@ fn three_levels_learn_and_play() {
         package: &learned.package,
         sequence: &sequence,
         test_shapes: &TEST,
+        trained_shapes: &[],
         settings: learned.config.features,
         encoder: learned.config.encoder(),
     };

@@ -16,7 +16,7 @@ use rand_chacha::ChaCha8Rng;
 use sinew_trainer::mesh::topology::Topology;
 use sinew_trainer::network::loss::LossSettings;
 use sinew_trainer::network::weights::StackWeights;
-use sinew_trainer::training::data::ShapesSource;
+use sinew_trainer::training::data::FixedBatch;
 use sinew_trainer::training::fit::{Engine, FitInput, FitProgress, FitSettings, Flow, fit};
 
 /// Ten coarse components, five fine ones under each.
@@ -125,7 +125,7 @@ impl Subject {
             last = (Instant::now(), ProcessTime::now());
             Flow::Continue
         };
-        let batches = &mut ShapesSource::new(self.shapes.clone());
+        let batches = &mut FixedBatch::new(self.shapes.clone());
         let start = self.weights.clone();
         fit(&input, start, &settings, batches, &mut |_| f32::NAN, &mut observe, None).expect("a fit of sound numbers");
         Measured {

@@ -93,7 +93,13 @@ fn the_chain_from_shapes_to_a_pose() {
     let json = run(&["evaluate", &model, &at("bar"), "--json", "--save", &saved]);
     let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
     assert_eq!(json["shapes"], 8);
-    for key in ["encoder", "feature_projection", "position_projection", "round_trip"] {
+    for key in [
+        "encoder",
+        "linear_encoder",
+        "feature_projection",
+        "position_projection",
+        "round_trip",
+    ] {
         for figure in ["e_rms", "sted", "sted_s", "sted_t"] {
             assert!(
                 json[key][figure].as_f64().is_some_and(|x| x.is_finite() && x >= 0.0),
@@ -102,7 +108,14 @@ fn the_chain_from_shapes_to_a_pose() {
         }
     }
     assert!(json["max_percentage_error"]["two_level"].is_number() && json["components"]["coarse"].is_number());
-    for name in ["truth", "faces", "encoder", "feature_projection", "position_projection"] {
+    for name in [
+        "truth",
+        "faces",
+        "encoder",
+        "linear_encoder",
+        "feature_projection",
+        "position_projection",
+    ] {
         assert!(
             folder.path().join("saved").join(format!("{name}.npy")).exists(),
             "{name}"

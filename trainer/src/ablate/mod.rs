@@ -246,6 +246,7 @@ fn measure(
             package: &learned.package,
             sequence: input.sequence,
             test_shapes,
+            trained_shapes: &[],
             settings: config.features,
             encoder: config.encoder(),
         };

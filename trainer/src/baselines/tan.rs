@@ -18,7 +18,7 @@ use crate::learn::package::package;
 use crate::learn::prepare::Prepared;
 use crate::learn::{LearnError, Reporter};
 use crate::network::loss::LossSettings;
-use crate::training::data::ShapesSource;
+use crate::training::data::FixedBatch;
 use crate::training::fit::{FitInput, FitProgress, FitSettings, Flow, fit};
 
 /// Middle of the paper's two distances.
@@ -150,7 +150,7 @@ pub fn train(
 ) -> Result<(AlignedBytes, Training), LearnError> {
     let vertex_count = prepared.rest.len();
     let mut shapes = vec![0.0; vertex_count * FEATURE_COUNT];
-    for shape in &prepared.network {
+    for shape in prepared.network.iter() {
         shapes.extend_from_slice(shape.as_flattened());
     }
     let distances = |v: usize| prepared.distances(v);
@@ -171,7 +171,7 @@ pub fn train(
         &input,
         random_start(vertex_count, &[settings.component_count], settings.seed),
         &config.fit,
-        &mut ShapesSource::new(shapes),
+        &mut FixedBatch::new(shapes),
         // Nothing is held out: the last weights count.
         &mut |_| f32::NAN,
         &mut observe,
@@ -237,6 +237,7 @@ mod tests {
                 package: &bytes,
                 sequence: &sequence,
                 test_shapes: &train_shapes[1..],
+                trained_shapes: &[],
                 settings: config.features,
                 encoder: config.encoder(),
             };

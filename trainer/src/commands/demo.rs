@@ -88,6 +88,7 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<(), Failure> 
         package: &learned.package,
         sequence: &sequence,
         test_shapes: &test,
+        trained_shapes: &[],
         settings: learned.config.features,
         encoder: learned.config.encoder(),
     };

@@ -7,7 +7,7 @@ use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use sinew_formats::interchange::{MeshSequence, write_npy_f32, write_npy_u32};
 use sinew_formats::package::CompactView;
 use sinew_trainer::config::TrainConfig;
-use sinew_trainer::evaluate::{Evaluation, EvaluationInput, Scores, evaluate};
+use sinew_trainer::evaluate::{Evaluation, EvaluationInput, MaxPercentageError, Scores, evaluate};
 use sinew_trainer::learn::Reporter;
 
 use super::console::Console;
@@ -16,15 +16,16 @@ use super::{Failure, chosen_shapes, load_package, load_sequence, make_folder};
 /// Arguments of `sinew evaluate`.
 #[derive(Args)]
 #[command(
-    after_help = "Three ways to find the weights of an unseen shape, all with the same components and all played by the runtime:
-  encoder              the network's own answer, one pass
+    after_help = "Four ways to find the weights of an unseen shape, all with the same components and all played by the runtime:
+  network's encoder    level by level as the paper has it, attention shares out what is left
+  linear encoder       one fixed map of the features: the pseudo-inverse of the decoder at rest
   feature projection   least squares on features and, to first order, positions, from there
   position projection  Gauss-Newton on positions, from there: what the components can do
 and the round trip: features to positions without components, below which no figure can fall.
 
 E_rms   position error, per mille of the bounding ball (Kavan 2010)
 STED    difference of edge lengths in space and time (Vasa and Skala 2011); what the eye sees
-Perc    share of a shape's feature energy that the encoder misses, worst shape
+Perc    share of a shape's feature energy that an encoder misses, worst shape
 
 Any other scorer can check: --save writes the arrays."
 )]
@@ -39,7 +40,7 @@ pub struct EvaluateArguments {
     /// Print JSON
     #[arg(long)]
     json: bool,
-    /// Write truth.npy, faces.npy, encoder.npy, feature_projection.npy and position_projection.npy here
+    /// Write truth.npy, faces.npy, encoder.npy, linear_encoder.npy, feature_projection.npy and position_projection.npy here
     #[arg(long, value_name = "DIR")]
     save: Option<PathBuf>,
 }
@@ -80,11 +81,13 @@ pub fn run(arguments: &EvaluateArguments, console: &Console) -> Result<(), Failu
     let config = config_of(&view)?;
     let sequence = load_sequence(&arguments.sequence, console)?;
     let test = test_shapes(&sequence, &view, arguments.train_every)?;
+    let trained: Vec<usize> = (1..sequence.shape_count()).filter(|m| !test.contains(m)).collect();
     console.stage("measuring shapes", test.len() as u64);
     let input = EvaluationInput {
         package: &bytes,
         sequence: &sequence,
         test_shapes: &test,
+        trained_shapes: &trained,
         settings: config.features,
         encoder: config.encoder(),
     };
@@ -95,6 +98,7 @@ pub fn run(arguments: &EvaluateArguments, console: &Console) -> Result<(), Failu
         let arrays = [
             ("truth.npy", &shapes.truth),
             ("encoder.npy", &shapes.encoder),
+            ("linear_encoder.npy", &shapes.linear_encoder),
             ("feature_projection.npy", &shapes.feature_projection),
             ("position_projection.npy", &shapes.position_projection),
         ];
@@ -121,8 +125,9 @@ pub fn print_table(evaluation: &Evaluation) {
         "{:<22} {:>8} {:>8} {:>8} {:>8}",
         "", "E_rms", "STED", "STED_s", "STED_t"
     );
-    let rows: [(&str, &Scores); 4] = [
-        ("encoder", &evaluation.encoder),
+    let rows: [(&str, &Scores); 5] = [
+        ("network's encoder", &evaluation.encoder),
+        ("linear encoder", &evaluation.linear_encoder),
         ("feature projection", &evaluation.feature_projection),
         ("position projection", &evaluation.position_projection),
         ("round trip (floor)", &evaluation.round_trip),
@@ -133,9 +138,15 @@ pub fn print_table(evaluation: &Evaluation) {
             scores.e_rms, scores.sted, scores.sted_s, scores.sted_t
         );
     }
-    let perc = &evaluation.max_percentage_error;
+    print_missed("unseen shapes", &evaluation.max_percentage_error);
+    if let Some(trained) = &evaluation.trained_max_percentage_error {
+        print_missed("trained shapes", trained);
+    }
+}
+
+fn print_missed(shapes: &str, perc: &MaxPercentageError) {
     println!(
-        "Perc, worst shape: coarse alone {:.4}, all levels {:.4}",
-        perc.one_level, perc.two_level
+        "Perc, worst of the {shapes}: network's encoder, coarse alone {:.4}, all levels {:.4}; linear encoder {:.4}",
+        perc.one_level, perc.two_level, perc.linear
     );
 }

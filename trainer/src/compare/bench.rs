@@ -55,7 +55,7 @@ impl<'a> Bench<'a> {
         train.extend(aligned(&moving));
         let test = aligned(&truth);
 
-        let widened = |shape: &Vec<[f32; 9]>| shape.as_flattened().iter().map(|&x| f64::from(x)).collect();
+        let widened = |shape: &[[f32; 9]]| shape.as_flattened().iter().map(|&x| f64::from(x)).collect();
         let mut train_features: Vec<Vec<f64>> = vec![vec![0.0; 9 * prepared.rest.len()]];
         train_features.extend(prepared.network.iter().map(widened));
         let fit = GradientFit::new(&prepared.topology, &prepared.rest, &config.features);

@@ -372,6 +372,7 @@ impl Run<'_, '_> {
             package,
             sequence: bench.input.sequence,
             test_shapes: &bench.test_shapes,
+            trained_shapes: &[],
             settings: bench.input.settings.config.features,
             encoder,
         };
@@ -387,7 +388,8 @@ impl Run<'_, '_> {
         let metric = FeatureMetric::new(&bench.prepared.system, scaler.scales(), &bench.areas);
         let projection = FeatureProjection::new(&decoder, metric);
         let mut train_weights = vec![vec![0.0; decoder.component_count()]];
-        train_weights.par_extend(bench.prepared.network.par_iter().map(|shape| {
+        train_weights.par_extend((0..bench.prepared.network.len()).into_par_iter().map(|m| {
+            let shape = &bench.prepared.network[m];
             let features = scaler.to_network(&own.from_network(shape));
             projection.weights(&features, vec![0.0; decoder.component_count()])
         }));
@@ -401,6 +403,11 @@ impl Run<'_, '_> {
                 ProjectionKind::Encoder,
                 shapes.encoder,
                 Some(evaluation.max_percentage_error.two_level),
+            ),
+            (
+                ProjectionKind::LinearEncoder,
+                shapes.linear_encoder,
+                Some(evaluation.max_percentage_error.linear),
             ),
             (ProjectionKind::Features, shapes.feature_projection, None),
             (ProjectionKind::Positions, shapes.position_projection, None),

@@ -125,6 +125,8 @@ pub struct Projection {
 pub enum ProjectionKind {
     /// A network's own encoder.
     Encoder,
+    /// One linear map of the features: the pseudo-inverse of the decoder at rest.
+    LinearEncoder,
     /// Least squares in features and, to first order at the reference, in what they do to positions.
     Features,
     /// Least squares in positions.
@@ -136,6 +138,7 @@ impl ProjectionKind {
     pub fn name(self) -> &'static str {
         match self {
             Self::Encoder => "encoder",
+            Self::LinearEncoder => "linear map",
             Self::Features => "features",
             Self::Positions => "positions",
         }

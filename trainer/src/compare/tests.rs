@@ -75,7 +75,11 @@ fn every_method_is_measured_and_threads_change_nothing() {
             panic!("errors for every count");
         };
         assert!(*last <= 1.05 * first, "more control points say more: {method:?}");
-        for kind in [ProjectionKind::Encoder, ProjectionKind::Features] {
+        for kind in [
+            ProjectionKind::Encoder,
+            ProjectionKind::LinearEncoder,
+            ProjectionKind::Features,
+        ] {
             let of = |kind| {
                 method
                     .projections

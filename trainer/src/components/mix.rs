@@ -9,6 +9,13 @@ use rand::{Rng, RngCore, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+use crate::features::store::ShapeStore;
+
+/// Most shapes that one mix is drawn from, chosen anew for every mix: of thousands, all at once would be their average and
+/// its price a thousandfold.
+const SHAPES_OF_A_MIX: usize = 64;
 
 /// How mixes are drawn.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -41,7 +48,8 @@ impl Default for MixSettings {
 /// Draws mixes of M shapes over V vertices.
 #[derive(Debug, Clone)]
 pub struct Mixer {
-    shapes: Vec<Vec<[f32; 9]>>,
+    store: Arc<ShapeStore<9>>,
+    shapes: Vec<usize>,
     distances: Vec<Vec<f32>>,
     settings: MixSettings,
     seed: u64,
@@ -55,10 +63,17 @@ struct SoftRegion {
 }
 
 impl Mixer {
-    /// Shape: `shapes` is `[M][V][9]` in network units without the reference, `distances` `[candidate centres][V]`, the
-    /// longest being 1.
-    pub fn new(shapes: Vec<Vec<[f32; 9]>>, distances: Vec<Vec<f32>>, settings: MixSettings, seed: u64) -> Self {
+    /// Mixes those of the store (network units, without the reference) that `shapes` lists, `[M]`. Shape: `distances` is
+    /// `[candidate centres][V]`, the longest being 1.
+    pub fn new(
+        store: Arc<ShapeStore<9>>,
+        shapes: Vec<usize>,
+        distances: Vec<Vec<f32>>,
+        settings: MixSettings,
+        seed: u64,
+    ) -> Self {
         Self {
+            store,
             shapes,
             distances,
             settings,
@@ -69,7 +84,7 @@ impl Mixer {
     /// Mixes number `first .. first + count`, flat `[count][V][9]`: always the same ones for the same seed, whatever was
     /// drawn before, so that a resumed run sees what the interrupted one would have seen.
     pub fn mixes(&self, first: u64, count: usize) -> Vec<f32> {
-        let width = self.shapes.first().map_or(0, |shape| shape.len() * 9);
+        let width = self.shapes.first().map_or(0, |&m| self.store[m].len() * 9);
         let mut mixes = vec![0.0; count * width];
         if width > 0 {
             mixes
@@ -83,8 +98,9 @@ impl Mixer {
     fn draw(&self, number: u64, mix: &mut [f32]) {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed);
         rng.set_stream(number);
-        let regions = self.draw_regions(&mut rng);
-        let shape_count = self.shapes.len();
+        let shapes = self.draw_shapes(&mut rng);
+        let shape_count = shapes.len();
+        let regions = self.draw_regions(shape_count, &mut rng);
         let mut window = vec![0.0_f32; regions.len()];
         let mut blend = vec![0.0_f32; shape_count];
         for (v, x) in mix.chunks_exact_mut(9).enumerate() {
@@ -109,7 +125,7 @@ impl Mixer {
                     }
                 }
             }
-            for (b, shape) in blend.iter().zip(&self.shapes) {
+            for (b, shape) in blend.iter().zip(&shapes) {
                 for (out, value) in x.iter_mut().zip(&shape[v]) {
                     *out += b * value;
                 }
@@ -117,8 +133,16 @@ impl Mixer {
         }
     }
 
-    fn draw_regions(&self, rng: &mut ChaCha8Rng) -> Vec<SoftRegion> {
-        let shape_count = self.shapes.len();
+    /// All shapes, or as many different ones as a mix may have.
+    fn draw_shapes(&self, rng: &mut ChaCha8Rng) -> Vec<&[[f32; 9]]> {
+        if self.shapes.len() <= SHAPES_OF_A_MIX {
+            return self.shapes.iter().map(|&m| &self.store[m]).collect();
+        }
+        let chosen = rand::seq::index::sample(rng, self.shapes.len(), SHAPES_OF_A_MIX);
+        chosen.iter().map(|i| &self.store[self.shapes[i]]).collect()
+    }
+
+    fn draw_regions(&self, shape_count: usize, rng: &mut ChaCha8Rng) -> Vec<SoftRegion> {
         let count = if rng.random::<f64>() < self.settings.whole_share {
             1
         } else {
@@ -164,7 +188,28 @@ mod tests {
                     .collect()
             })
             .collect();
-        Mixer::new(vec![shape(0), shape(1), shape(2)], distances, settings, 7)
+        let store = Arc::new(ShapeStore::of_shapes(&[shape(0), shape(1), shape(2)]));
+        Mixer::new(store, vec![0, 1, 2], distances, settings, 7)
+    }
+
+    #[test]
+    fn a_mix_of_many_shapes_takes_some_and_other_mixes_take_others() {
+        let mut one = line_mixer(MixSettings {
+            whole_share: 1.0,
+            ..MixSettings::default()
+        });
+        // Shape m moves vertex m alone.
+        let count = 2 * SHAPES_OF_A_MIX;
+        let shape = |m: usize| (0..count).map(|v| [if v == m { 1.0 } else { 0.0 }; 9]).collect();
+        one.store = Arc::new(ShapeStore::of_shapes(&(0..count).map(shape).collect::<Vec<_>>()));
+        one.shapes = (0..count).collect();
+        one.distances = vec![vec![0.0; count]];
+        let moved = |number: u64| -> Vec<usize> {
+            let mix = one.mixes(number, 1);
+            (0..count).filter(|v| mix[9 * v] != 0.0).collect()
+        };
+        assert_eq!(moved(0).len(), SHAPES_OF_A_MIX);
+        assert_ne!(moved(0), moved(1));
     }
 
     #[test]

@@ -51,7 +51,7 @@ pub fn descend<P: LeastSquares>(
         let equations = problem.linearise(&weights)?;
         let mut accepted = None;
         for _ in 0..TRIAL_LIMIT {
-            let Some(step) = solve(&equations, ridge) else {
+            let Some(step) = equations.step(ridge) else {
                 ridge *= RIDGE_FACTOR;
                 continue;
             };
@@ -82,15 +82,18 @@ pub fn descend<P: LeastSquares>(
     Ok(weights)
 }
 
-fn solve(equations: &NormalEquations, ridge: f64) -> Option<DVector<f64>> {
-    let mut matrix = equations.matrix.clone();
-    let component_count = matrix.nrows();
-    let mean = matrix.diagonal().sum() / component_count as f64;
-    for k in 0..component_count {
-        matrix[(k, k)] += ridge * mean;
+impl NormalEquations {
+    /// The step, where `ridge` times the mean diagonal is added to the diagonal; nothing where there is none.
+    pub fn step(&self, ridge: f64) -> Option<DVector<f64>> {
+        let mut matrix = self.matrix.clone();
+        let component_count = matrix.nrows();
+        let mean = matrix.diagonal().sum() / component_count as f64;
+        for k in 0..component_count {
+            matrix[(k, k)] += ridge * mean;
+        }
+        let step = Cholesky::new(matrix)?.solve(&self.right_hand_side);
+        step.iter().all(|x| x.is_finite()).then_some(step)
     }
-    let step = Cholesky::new(matrix)?.solve(&equations.right_hand_side);
-    step.iter().all(|x| x.is_finite()).then_some(step)
 }
 
 #[cfg(test)]

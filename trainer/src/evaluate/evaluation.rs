@@ -1,4 +1,4 @@
-//! Evaluates a package on shapes it was not trained on: three ways to find weights, each decoded and solved by the
+//! Evaluates a package on shapes it was not trained on: four ways to find weights, each decoded and solved by the
 //! runtime, scored against the truth (method sections 3 and 4).
 
 use core::sync::atomic::{AtomicUsize, Ordering};
@@ -36,6 +36,8 @@ pub struct EvaluationInput<'a> {
     pub sequence: &'a MeshSequence,
     /// Indices of the shapes to measure, in temporal order.
     pub test_shapes: &'a [usize],
+    /// Shapes that were trained on, of which only [`Evaluation::trained_max_percentage_error`] is found; may be none.
+    pub trained_shapes: &'a [usize],
     /// Settings of the features, those of the training.
     pub settings: FeatureSettings,
     /// What the encoder takes from the training.
@@ -51,16 +53,20 @@ pub struct Evaluation {
     pub vertices: usize,
     /// Components of the package.
     pub components: ComponentCounts,
-    /// Weights from the network's encoder.
+    /// Weights from the network's encoder: level by level, residuals shared out by attention.
     pub encoder: Scores,
+    /// Weights from one linear map of the features, the pseudo-inverse of the whole decoder at rest.
+    pub linear_encoder: Scores,
     /// Weights by least squares in feature space, in the metric of [`FeatureMetric`].
     pub feature_projection: Scores,
     /// Weights by Gauss-Newton on positions.
     pub position_projection: Scores,
     /// No components at all: features, solve, positions. The floor.
     pub round_trip: Scores,
-    /// Share of a shape's feature energy that the encoder's reconstruction misses, worst shape.
+    /// Share of a shape's feature energy that a reconstruction in one pass misses, worst shape.
     pub max_percentage_error: MaxPercentageError,
+    /// The same of the shapes that were trained on.
+    pub trained_max_percentage_error: Option<MaxPercentageError>,
 }
 
 /// Components by scale.
@@ -75,10 +81,36 @@ pub struct ComponentCounts {
 /// `max_m |X_m - Xhat_m|^2 / |X_m|^2`, network units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MaxPercentageError {
-    /// Root block alone.
+    /// The network's encoder, root block alone.
     pub one_level: f64,
-    /// All levels.
+    /// The network's encoder, all levels.
     pub two_level: f64,
+    /// The linear encoder, all levels.
+    pub linear: f64,
+}
+
+impl MaxPercentageError {
+    fn of<'m>(missed: impl IntoIterator<Item = &'m Missed>) -> Self {
+        let none = Self {
+            one_level: 0.0,
+            two_level: 0.0,
+            linear: 0.0,
+        };
+        let moving = missed.into_iter().filter(|missed| missed.energy > 0.0);
+        moving.fold(none, |worst, missed| Self {
+            one_level: worst.one_level.max(missed.one_level / missed.energy),
+            two_level: worst.two_level.max(missed.two_level / missed.energy),
+            linear: worst.linear.max(missed.linear / missed.energy),
+        })
+    }
+}
+
+/// Feature energy of one shape, and what of it is missed.
+struct Missed {
+    energy: f64,
+    one_level: f64,
+    two_level: f64,
+    linear: f64,
 }
 
 /// The measured shapes, for saving and for pictures. Shape of each: `[N][V]`, source order.
@@ -88,6 +120,8 @@ pub struct Reconstructions {
     pub truth: Vec<Vec<[f32; 3]>>,
     /// Near the reference, like all that follow.
     pub encoder: Vec<Vec<[f32; 3]>>,
+    /// Near the reference.
+    pub linear_encoder: Vec<Vec<[f32; 3]>>,
     /// Near the reference.
     pub feature_projection: Vec<Vec<[f32; 3]>>,
     /// Near the reference.
@@ -151,8 +185,9 @@ pub enum EvaluationError {
 
 /// Everything found for one shape.
 struct ShapeResult {
-    encoding: Encoding,
+    missed: Missed,
     encoder: Vec<[f32; 3]>,
+    linear_encoder: Vec<[f32; 3]>,
     feature_projection: Vec<[f32; 3]>,
     position_projection: Vec<[f32; 3]>,
     position_weights: Vec<f64>,
@@ -196,19 +231,17 @@ pub fn evaluate(
         .filter(|b| b.level == 0)
         .map(|b| b.component_count as usize)
         .sum();
-    let worst = |share: fn(&Encoding) -> f64| {
-        let moving = results
-            .iter()
-            .map(|result| &result.encoding)
-            .filter(|encoding| encoding.energy > 0.0);
-        moving
-            .map(|encoding| share(encoding) / encoding.energy)
-            .fold(0.0, f64::max)
-    };
-    let max_percentage_error = MaxPercentageError {
-        one_level: worst(|encoding| encoding.root_residual_energy),
-        two_level: worst(|encoding| encoding.residual_energy),
-    };
+    let max_percentage_error = MaxPercentageError::of(results.iter().map(|result| &result.missed));
+    let trained: Vec<Missed> = input
+        .trained_shapes
+        .par_iter()
+        .map(|&m| {
+            let features = bench.features(&fit, &input.sequence.shapes[m]);
+            let linear_weights = projection.linear_weights(&features);
+            bench.missed(&encoder.encode(&features), &linear_weights, &features)
+        })
+        .collect();
+    let trained_max_percentage_error = (!trained.is_empty()).then(|| MaxPercentageError::of(&trained));
     let mut round_trip = Vec::with_capacity(results.len());
     let mut found = Reconstructions {
         truth,
@@ -216,6 +249,7 @@ pub fn evaluate(
     };
     for result in results {
         found.encoder.push(result.encoder);
+        found.linear_encoder.push(result.linear_encoder);
         found.feature_projection.push(result.feature_projection);
         found.position_projection.push(result.position_projection);
         found.position_weights.push(result.position_weights);
@@ -229,10 +263,12 @@ pub fn evaluate(
             fine: package.component_count() - coarse,
         },
         encoder: score(&found.truth, &found.encoder, &faces)?,
+        linear_encoder: score(&found.truth, &found.linear_encoder, &faces)?,
         feature_projection: score(&found.truth, &found.feature_projection, &faces)?,
         position_projection: score(&found.truth, &found.position_projection, &faces)?,
         round_trip: score(&found.truth, &round_trip, &faces)?,
         max_percentage_error,
+        trained_max_percentage_error,
     };
     Ok((evaluation, found))
 }
@@ -251,7 +287,12 @@ fn check(input: &EvaluationInput<'_>, package: &CompactView<'_>) -> Result<(), E
         return Err(EvaluationError::Faces { face });
     }
     let shape_count = input.sequence.shape_count();
-    match input.test_shapes.iter().find(|&&shape| shape >= shape_count) {
+    match input
+        .test_shapes
+        .iter()
+        .chain(input.trained_shapes)
+        .find(|&&shape| shape >= shape_count)
+    {
         Some(&shape) => Err(EvaluationError::NoSuchShape { shape, shape_count }),
         None if input.test_shapes.is_empty() => Err(ScoreError::Nothing.into()),
         None => Ok(()),
@@ -306,26 +347,42 @@ impl<'b> Bench<'b> {
         shape: usize,
         positions: &[[f32; 3]],
     ) -> Result<ShapeResult, EvaluationError> {
-        let wide = widened(positions);
-        let motion = RigidMotion::onto(&self.surface.rest, &wide);
-        let aligned: Vec<[f64; 3]> = wide.iter().map(|&p| motion.apply(p)).collect();
-        let features: Vec<[f32; FEATURE_COUNT]> =
-            self.scaler
-                .to_network(&features_of_shape(&self.surface.topology, fit, &aligned));
-
+        let features = self.features(fit, positions);
         let mut memory = vec![0; self.layout.unaligned_bytes()];
         let mut player = Player::new(&self.basis, Workspace::new(&self.basis, &mut memory)?);
         let fail = |source| EvaluationError::Play { shape, source };
         let encoding = encoder.encode(&features);
-        let feature_weights = projection.weights(&features, encoding.weights.clone());
+        let linear_weights = projection.linear_weights(&features);
+        let feature_weights = projection.weights(&features, linear_weights.clone());
         let position_weights = project_positions(&mut player, positions, feature_weights.clone()).map_err(fail)?;
         Ok(ShapeResult {
             encoder: player.play(&encoding.weights).map_err(fail)?.to_vec(),
+            linear_encoder: player.play(&linear_weights).map_err(fail)?.to_vec(),
             feature_projection: player.play(&feature_weights).map_err(fail)?.to_vec(),
             position_projection: player.play(&position_weights).map_err(fail)?.to_vec(),
             round_trip: player.reconstruct(&features).map_err(fail)?.to_vec(),
             position_weights,
-            encoding,
+            missed: self.missed(&encoding, &linear_weights, &features),
         })
+    }
+
+    /// Features of a shape brought near the reference, network units. Shape: `[V]`.
+    fn features(&self, fit: &GradientFit<'_>, positions: &[[f32; 3]]) -> Vec<[f32; FEATURE_COUNT]> {
+        let wide = widened(positions);
+        let motion = RigidMotion::onto(&self.surface.rest, &wide);
+        let aligned: Vec<[f64; 3]> = wide.iter().map(|&p| motion.apply(p)).collect();
+        self.scaler
+            .to_network(&features_of_shape(&self.surface.topology, fit, &aligned))
+    }
+
+    fn missed(&self, encoding: &Encoding, linear_weights: &[f64], features: &[[f32; FEATURE_COUNT]]) -> Missed {
+        let decoded = self.decoder.decode_all(linear_weights);
+        let pairs = features.as_flattened().iter().zip(decoded.as_flattened());
+        Missed {
+            energy: encoding.energy,
+            one_level: encoding.root_residual_energy,
+            two_level: encoding.residual_energy,
+            linear: pairs.map(|(&x, y)| (f64::from(x) - y).powi(2)).sum(),
+        }
     }
 }

@@ -9,7 +9,7 @@ use super::descent::{DescentSettings, LeastSquares, NormalEquations, descend};
 use super::feature_metric::{FeatureMetric, squared_length};
 use super::position_projection::gram_matrix;
 
-/// Converges in 3 to 6 steps from the encoder's weights; the rest is for shapes far from training.
+/// Converges in 3 to 6 steps from weights near the answer; the rest is for shapes far from training.
 const DESCENT: DescentSettings = DescentSettings {
     step_limit: 12,
     ridge: 1e-6,
@@ -154,16 +154,31 @@ impl<'a> FeatureProjection<'a> {
         }
     }
 
-    /// Weights that bring `|X - Xhat(z)|` of the metric down, from `start` (the encoder's). Shapes: `features` `[V]`, source
-    /// order; `start` `[K]`. Stretch counts as it stands in network units, already down-weighted.
-    pub fn weights(&self, features: &[[f32; FEATURE_COUNT]], start: Vec<f64>) -> Vec<f64> {
+    /// Weights in one pass, without a search: least squares of the decoder as it is at the reference, where tanh is the
+    /// identity. Shapes: `features` `[V]`, source order; the answer `[K]`.
+    pub fn linear_weights(&self, features: &[[f32; FEATURE_COUNT]]) -> Vec<f64> {
+        let mut misfit = self.misfit(features);
+        let Ok(equations) = misfit.linearise(&vec![0.0; self.decoder.component_count]);
+        match equations.step(DESCENT.ridge) {
+            Some(weights) => weights.iter().copied().collect(),
+            None => vec![0.0; self.decoder.component_count],
+        }
+    }
+
+    fn misfit(&self, features: &[[f32; FEATURE_COUNT]]) -> FeatureMisfit<'_> {
         let target: Vec<[f64; FEATURE_COUNT]> = features.iter().map(|x| x.map(f64::from)).collect();
         let position_weight = self.metric.position_weight(&target);
-        let mut misfit = FeatureMisfit {
+        FeatureMisfit {
             projection: self,
             target,
             position_weight,
-        };
+        }
+    }
+
+    /// Weights that bring `|X - Xhat(z)|` of the metric down, from `start` ([`Self::linear_weights`], or any). Shapes: `features` `[V]`, source
+    /// order; `start` `[K]`. Stretch counts as it stands in network units, already down-weighted.
+    pub fn weights(&self, features: &[[f32; FEATURE_COUNT]], start: Vec<f64>) -> Vec<f64> {
+        let mut misfit = self.misfit(features);
         let Ok(weights) = descend(&mut misfit, start, &DESCENT);
         weights
     }

@@ -95,6 +95,7 @@ fn evaluation_ranks_the_three_ways_and_names_its_fields() {
         package: &package,
         sequence: &sequence,
         test_shapes: &[1, 2],
+        trained_shapes: &[1],
         settings: FeatureSettings::default(),
         encoder: EncoderSettings::default(),
     };
@@ -102,17 +103,23 @@ fn evaluation_ranks_the_three_ways_and_names_its_fields() {
     assert_eq!((evaluation.shapes, evaluation.vertices), (2, fixture::mesh().0.len()));
     assert_eq!(evaluation.components, ComponentCounts { coarse: 3, fine: 4 });
     assert!(evaluation.position_projection.e_rms < evaluation.feature_projection.e_rms);
-    assert!(evaluation.feature_projection.e_rms < evaluation.encoder.e_rms);
+    assert!(evaluation.feature_projection.e_rms < evaluation.linear_encoder.e_rms);
+    assert!(evaluation.linear_encoder.e_rms < evaluation.encoder.e_rms);
+    let trained = evaluation.trained_max_percentage_error.unwrap();
+    assert!(trained.linear > 0.0 && trained.linear <= evaluation.max_percentage_error.linear);
     assert_eq!(reconstructions.encoder.len(), 2);
     let json = serde_json::to_value(&evaluation).unwrap();
     for pointer in [
         "/components/coarse",
         "/encoder/e_rms",
+        "/linear_encoder/e_rms",
         "/feature_projection/sted",
         "/position_projection/sted_s",
         "/round_trip/sted_t",
         "/max_percentage_error/one_level",
         "/max_percentage_error/two_level",
+        "/max_percentage_error/linear",
+        "/trained_max_percentage_error/two_level",
     ] {
         assert!(
             json.pointer(pointer).is_some_and(serde_json::Value::is_number),

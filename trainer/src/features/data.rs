@@ -187,7 +187,7 @@ fn round_trip(sequence: &Sequence, settings: &FeatureSettings) -> RoundTrip {
     let features = AcapFeatures::compute(&topology, &rest, &shapes, settings, &|_| {});
     let seconds = start.elapsed().as_secs_f64();
     let weights = EdgeWeights::new(&topology, &rest);
-    let anchor = choose_anchor(&rest, &shapes);
+    let anchor = choose_anchor(&rest, shapes.iter().cloned());
     let system = PoissonSystem::new(&topology, &weights, &rest, anchor).expect("definite");
     let (mut sum, mut radius, mut wrapped_edges) = (0.0, 0.0f64, 0);
     for (shape, feature) in shapes.iter().zip(&features.shapes) {

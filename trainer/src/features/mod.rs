@@ -9,6 +9,7 @@ pub mod polar;
 pub mod reconstruct;
 mod refine;
 pub mod scaler;
+pub mod store;
 
 #[cfg(test)]
 pub(crate) mod data;

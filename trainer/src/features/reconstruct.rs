@@ -170,11 +170,11 @@ impl PoissonSystem {
 
 /// The vertex to hold still: the one that moves least over the aligned `shapes` (`[N][V][3]`), of equals the one nearest
 /// to the centroid of `rest`, of equals the first.
-pub fn choose_anchor(rest: &[[f64; 3]], shapes: &[Vec<[f64; 3]>]) -> usize {
+pub fn choose_anchor(rest: &[[f64; 3]], shapes: impl IntoIterator<Item = Vec<[f64; 3]>>) -> usize {
     let mut motion = vec![0.0; rest.len()];
     for shape in shapes {
-        for (v, position) in shape.iter().enumerate() {
-            motion[v] += (Vector3::from(*position) - Vector3::from(rest[v])).norm_squared();
+        for (v, position) in shape.into_iter().enumerate() {
+            motion[v] += (Vector3::from(position) - Vector3::from(rest[v])).norm_squared();
         }
     }
     let centroid = rest.iter().fold(Vector3::zeros(), |sum, p| sum + Vector3::from(*p)) / rest.len().max(1) as f64;
@@ -276,9 +276,9 @@ mod tests {
     #[test]
     fn the_anchor_is_what_moves_least() {
         let rest = vec![[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0]];
-        assert_eq!(choose_anchor(&rest, &[]), 1);
+        assert_eq!(choose_anchor(&rest, []), 1);
         let mut shape = rest.clone();
         shape[1][1] = 0.5;
-        assert_eq!(choose_anchor(&rest, &[shape]), 2);
+        assert_eq!(choose_anchor(&rest, [shape]), 2);
     }
 }

@@ -25,16 +25,16 @@ impl FeatureScaler {
     /// let a stretch count `stretch_weight` times a rotation of as many radians. The stretch scale is raised where
     /// stretches would leave 0.95.
     pub fn fit(features: &AcapFeatures, shapes: &[usize], rotation_reach: f64, stretch_weight: f64) -> FeatureScaler {
-        let (mut rotation, mut stretch) = (0.0f64, 0.0f64);
-        for &m in shapes {
-            for feature in &features.shapes[m] {
-                let deviation = deviation(feature);
-                rotation = deviation[..3]
-                    .iter()
-                    .fold(rotation, |greatest, x| greatest.max(x.abs()));
-                stretch = deviation[3..].iter().fold(stretch, |greatest, x| greatest.max(x.abs()));
-            }
-        }
+        let greatest = shapes
+            .iter()
+            .map(|&m| Greatest::of(&features.shapes[m]))
+            .fold(Greatest::default(), Greatest::or);
+        Self::of_greatest(greatest, rotation_reach, stretch_weight)
+    }
+
+    /// The same of what was found over all shapes.
+    pub fn of_greatest(greatest: Greatest, rotation_reach: f64, stretch_weight: f64) -> FeatureScaler {
+        let Greatest { rotation, stretch } = greatest;
         let rotation_scale = (rotation / rotation_reach.clamp(f64::MIN_POSITIVE, VALUE_LIMIT)).max(SCALE_FLOOR);
         let stretch_scale = (rotation_scale / stretch_weight)
             .max(stretch / VALUE_LIMIT)
@@ -72,7 +72,39 @@ impl FeatureScaler {
     }
 }
 
-fn deviation(feature: &[f64; 9]) -> [f64; 9] {
+/// The greatest magnitudes of differences from the reference.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Greatest {
+    /// Of an entry of a rotation, radians.
+    pub rotation: f64,
+    /// Of an entry of a stretch.
+    pub stretch: f64,
+}
+
+impl Greatest {
+    /// Of one shape. Shape: `[V]`.
+    pub fn of(features: &[[f64; 9]]) -> Self {
+        let mut greatest = Self::default();
+        for feature in features {
+            let deviation = deviation(feature);
+            let most = |start: f64, values: &[f64]| values.iter().fold(start, |most, x| most.max(x.abs()));
+            greatest.rotation = most(greatest.rotation, &deviation[..3]);
+            greatest.stretch = most(greatest.stretch, &deviation[3..]);
+        }
+        greatest
+    }
+
+    /// Of both.
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            rotation: self.rotation.max(other.rotation),
+            stretch: self.stretch.max(other.stretch),
+        }
+    }
+}
+
+/// The feature less that of the reference.
+pub fn deviation(feature: &[f64; 9]) -> [f64; 9] {
     core::array::from_fn(|c| feature[c] - super::acap::NEUTRAL_FEATURE[c])
 }
 

@@ -52,8 +52,8 @@ impl HeldOut {
     /// E_rms of the held-out shapes through encoder, decode and solve: what a user of the package would see.
     pub fn error(&self, prepared: &Prepared, config: &TrainConfig, weights: &StackWeights) -> Result<f32, LearnError> {
         let basis = draft(prepared, config, weights, &self.rest_of(prepared.network.len()))?;
-        let inputs: Vec<&[[f32; 9]]> = self.shapes.iter().map(|&m| prepared.network[m].as_slice()).collect();
-        let truth = self.shapes.iter().map(|&m| prepared.aligned[m].clone()).collect();
+        let inputs: Vec<&[[f32; 9]]> = self.shapes.iter().map(|&m| &prepared.network[m]).collect();
+        let truth = self.shapes.iter().map(|&m| prepared.aligned[m].to_vec()).collect();
         Ok(encoder_error(&basis, config.encoder(), &inputs, Some(truth))?)
     }
 }

@@ -121,6 +121,16 @@ pub enum LearnError {
         /// N.
         shapes: usize,
     },
+    /// Features go to a file where they are many, and there is no room for it.
+    #[error(
+        "the features of the training shapes cannot be kept in {}: {source}; make room there, or name another folder in TMPDIR",
+        std::env::temp_dir().display()
+    )]
+    Store {
+        /// As it says.
+        #[from]
+        source: std::io::Error,
+    },
     /// The mesh's matrix cannot be factored.
     #[error("the mesh cannot be solved on: {0}")]
     Factor(#[from] FactorError),

@@ -142,7 +142,8 @@ const NUMBER_OF_RANGE_MIXES: u64 = 1 << 41;
 /// Mixes whose weights count for the stops of the controls.
 const RANGE_MIXES: usize = 32;
 
-/// The stops of every control: the least and greatest weight of the training shapes and of mixes of them, 0 included. A
+/// The stops of every control: the least and greatest weight of the training shapes (of 256, where there are more) and of mixes of them, 0
+/// included. A
 /// handful of poses alone would leave most controls one-sided. While training goes on the encoder finds the weights, which
 /// is quick.
 fn measure_ranges(
@@ -202,10 +203,19 @@ fn range_mixes(prepared: &Prepared, config: &TrainConfig, shapes: &[usize]) -> V
     }
 }
 
-/// The given training shapes, then the mixes of them.
+/// Most training shapes whose weights count for the stops.
+const RANGE_SHAPES_MAX: usize = 256;
+
+/// Up to `count` of `shapes`, spread evenly.
+fn spread(shapes: &[usize], count: usize) -> impl Iterator<Item = usize> {
+    let count = count.min(shapes.len());
+    (0..count).map(move |i| shapes[i * shapes.len() / count])
+}
+
+/// The given training shapes, or some of them where they are many; then the mixes of them.
 fn range_shapes<'a>(prepared: &'a Prepared, shapes: &[usize], mixes: &'a [f32]) -> Vec<&'a [[f32; 9]]> {
     let mixes = mixes.as_chunks::<9>().0.chunks(prepared.rest.len());
-    let posed = shapes.iter().map(|&m| prepared.network[m].as_slice());
+    let posed = spread(shapes, RANGE_SHAPES_MAX).map(|m| &prepared.network[m]);
     posed.chain(mixes).collect()
 }
 

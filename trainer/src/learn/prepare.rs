@@ -1,17 +1,21 @@
 //! What every later stage of training reads: the mesh, distances on it, and the training shapes as network values.
 
+use core::sync::atomic::{AtomicUsize, Ordering};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use rayon::prelude::*;
 use sinew_formats::interchange::{MeshSequence, RenderSurface};
 
 use super::{LearnError, Reporter};
 use crate::components::extract::BasisFrame;
 use crate::config::TrainConfig;
-use crate::features::acap::AcapFeatures;
-use crate::features::align::{align_shapes, widened};
+use crate::features::acap::features_of_shape;
+use crate::features::align::{RigidMotion, widened};
+use crate::features::gradient::GradientFit;
 use crate::features::reconstruct::{PoissonSystem, choose_anchor};
-use crate::features::scaler::FeatureScaler;
+use crate::features::scaler::{FeatureScaler, Greatest, deviation};
+use crate::features::store::{MAPPED_FROM_BYTES, ShapeStore};
 use crate::mesh::cotangent::EdgeWeights;
 use crate::mesh::geodesic::HeatMethod;
 use crate::mesh::topology::Topology;
@@ -36,9 +40,9 @@ pub struct Prepared {
     /// Scales between features and network values.
     pub scaler: FeatureScaler,
     /// Training shapes in network units, reference excluded. Shape: `[M][V][9]`.
-    pub network: Vec<Vec<[f32; 9]>>,
+    pub network: Arc<ShapeStore<9>>,
     /// The same shapes as aligned positions. Shape: `[M][V]`.
-    pub aligned: Vec<Vec<[f32; 3]>>,
+    pub aligned: ShapeStore<3>,
     /// Distances from the centres that mixes choose from, longest 1. Shape: `[centres][V]`.
     pub centre_distances: Vec<Vec<f32>>,
     heat: HeatMethod,
@@ -67,29 +71,23 @@ impl Prepared {
         reporter.stage("features", shapes.len() as u64);
         let topology = Topology::new(&sequence.faces, &rest);
         let weights = EdgeWeights::new(&topology, &rest);
-        let chosen: Vec<Vec<[f32; 3]>> = shapes.iter().map(|&m| sequence.shapes[m].clone()).collect();
-        let aligned: Vec<Vec<[f64; 3]>> = align_shapes(&rest, &chosen)
-            .into_iter()
-            .map(|shape| shape.positions)
-            .collect();
-        if !aligned.iter().any(|shape| moves(&rest, shape)) {
-            return Err(LearnError::NothingMoves { shapes: shapes.len() });
-        }
-        let features = AcapFeatures::compute(&topology, &rest, &aligned, &config.features, &|done| {
-            reporter.advance(done as u64, "")
-        });
-        if reporter.stop_requested() {
-            return Err(LearnError::Stopped);
-        }
-        let all: Vec<usize> = (0..shapes.len()).collect();
-        let scaler = FeatureScaler::fit(
-            &features,
-            &all,
+        let fit = GradientFit::new(&topology, &rest, &config.features);
+        let read = read_shapes(sequence, &shapes, &rest, &topology, &fit, reporter)?;
+        drop(fit);
+        let scaler = FeatureScaler::of_greatest(
+            read.greatest,
             config.scaling.rotation_reach,
             config.scaling.stretch_weight,
         );
-        let network = features.shapes.iter().map(|shape| scaler.to_network(shape)).collect();
-        let anchor = choose_anchor(&rest, &aligned);
+        let (aligned, mut network) = (read.aligned, read.deviations);
+        let scales = scaler.scales();
+        network
+            .values_mut()
+            .as_chunks_mut::<9>()
+            .0
+            .par_iter_mut()
+            .for_each(|value| *value = core::array::from_fn(|c| (f64::from(value[c]) / scales[c]) as f32));
+        let anchor = choose_anchor(&rest, aligned.iter().map(widened));
         let system = PoissonSystem::new(&topology, &weights, &rest, anchor)?;
         let areas = topology.vertex_areas(&rest).into_iter().map(|a| a as f32).collect();
 
@@ -105,9 +103,8 @@ impl Prepared {
         if reporter.stop_requested() {
             return Err(LearnError::Stopped);
         }
-        let rounded = |shape: &Vec<[f64; 3]>| shape.iter().map(|p| p.map(|x| x as f32)).collect();
         Ok(Self {
-            aligned: aligned.iter().map(rounded).collect(),
+            aligned,
             rest,
             rest_positions,
             render: sequence.render.clone(),
@@ -115,7 +112,7 @@ impl Prepared {
             system,
             areas,
             scaler,
-            network,
+            network: Arc::new(network),
             centre_distances,
             heat,
             cache: Mutex::new(BTreeMap::new()),
@@ -167,11 +164,78 @@ impl Prepared {
         digest.update(config.to_toml().as_bytes());
         digest.update(bytemuck::cast_slice(&self.rest_positions));
         digest.update(bytemuck::cast_slice(&self.topology.faces));
-        for shape in &self.network {
+        for shape in self.network.iter() {
             digest.update(bytemuck::cast_slice(shape));
         }
         format!("{:016x}", digest.finalize())
     }
+}
+
+/// The training shapes, read off one by one: no more than a few are held in double precision.
+struct ReadShapes {
+    /// Shape: `[M][V]`.
+    aligned: ShapeStore<3>,
+    /// Features less the reference's, not scaled yet. Shape: `[M][V]`.
+    deviations: ShapeStore<9>,
+    greatest: Greatest,
+}
+
+fn read_shapes(
+    sequence: &MeshSequence,
+    shapes: &[usize],
+    rest: &[[f64; 3]],
+    topology: &Topology,
+    fit: &GradientFit<'_>,
+    reporter: &dyn Reporter,
+) -> Result<ReadShapes, LearnError> {
+    let vertex_count = rest.len();
+    let mut aligned = ShapeStore::<3>::zeros(shapes.len(), vertex_count, MAPPED_FROM_BYTES)?;
+    let mut deviations = ShapeStore::<9>::zeros(shapes.len(), vertex_count, MAPPED_FROM_BYTES)?;
+    let mapped = aligned.mapped_bytes().unwrap_or(0) + deviations.mapped_bytes().unwrap_or(0);
+    if mapped > 0 {
+        reporter.notice(&format!(
+            "features of {} shapes take {:.1} GB, in a file without a name in {} (TMPDIR names another folder)",
+            shapes.len(),
+            mapped as f64 * 1e-9,
+            std::env::temp_dir().display()
+        ));
+    }
+    let done = AtomicUsize::new(0);
+    let places = aligned.values_mut().par_chunks_mut(3 * vertex_count);
+    let places = places.zip(deviations.values_mut().par_chunks_mut(9 * vertex_count));
+    let found: Vec<(bool, Greatest)> = shapes
+        .par_iter()
+        .zip(places)
+        .map(|(&m, (positions, values))| {
+            if reporter.stop_requested() {
+                return (false, Greatest::default());
+            }
+            let shape = widened(&sequence.shapes[m]);
+            let motion = RigidMotion::onto(rest, &shape);
+            let shape: Vec<[f64; 3]> = shape.into_iter().map(|p| motion.apply(p)).collect();
+            let features = features_of_shape(topology, fit, &shape);
+            for (place, p) in positions.as_chunks_mut().0.iter_mut().zip(&shape) {
+                *place = p.map(|x| x as f32);
+            }
+            for (place, feature) in values.as_chunks_mut().0.iter_mut().zip(&features) {
+                *place = deviation(feature).map(|x| x as f32);
+            }
+            reporter.advance(done.fetch_add(1, Ordering::Relaxed) as u64 + 1, "");
+            (moves(rest, &shape), Greatest::of(&features))
+        })
+        .collect();
+    if reporter.stop_requested() {
+        return Err(LearnError::Stopped);
+    }
+    if !found.iter().any(|(moves, _)| *moves) {
+        return Err(LearnError::NothingMoves { shapes: shapes.len() });
+    }
+    let greatest = found.into_iter().map(|(_, greatest)| greatest);
+    Ok(ReadShapes {
+        aligned,
+        deviations,
+        greatest: greatest.fold(Greatest::default(), Greatest::or),
+    })
 }
 
 fn narrowed(values: Vec<f64>) -> Vec<f32> {

@@ -6,7 +6,7 @@ use sinew_formats::interchange::MeshSequence;
 
 use super::LearnError;
 use super::prepare::moves;
-use crate::features::align::{align_shapes, widened};
+use crate::features::align::{RigidMotion, widened};
 use crate::mesh::topology::{Topology, difference, is_flat, length};
 
 /// A shape whose edges are off by less than this share of their length is never taken for broken.
@@ -66,10 +66,16 @@ pub fn review(sequence: &MeshSequence, train_shapes: &[usize], component_count: 
             names(sequence, broken.iter().map(|&i| asked[i]))
         ));
     }
-    let chosen: Vec<Vec<[f32; 3]>> = sound.iter().map(|&i| sequence.shapes[asked[i]].clone()).collect();
-    let aligned = align_shapes(&rest, &chosen);
-    let (moving, still): (Vec<usize>, Vec<usize>) =
-        (0..sound.len()).partition(|&i| moves(&rest, &aligned[i].positions));
+    let moved: Vec<bool> = sound
+        .par_iter()
+        .map(|&i| {
+            let shape = widened(&sequence.shapes[asked[i]]);
+            let motion = RigidMotion::onto(&rest, &shape);
+            let aligned: Vec<[f64; 3]> = shape.into_iter().map(|p| motion.apply(p)).collect();
+            moves(&rest, &aligned)
+        })
+        .collect();
+    let (moving, still): (Vec<usize>, Vec<usize>) = (0..sound.len()).partition(|&i| moved[i]);
     let (shapes, still): (Vec<usize>, Vec<usize>) = (
         moving.iter().map(|&i| asked[sound[i]]).collect(),
         still.iter().map(|&i| asked[sound[i]]).collect(),

@@ -1,6 +1,7 @@
 //! The stages of a training run: choosing how to mix and where to start, and fits of the network.
 
 use core::time::Duration;
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::hold_out::{HeldOut, encoder_error};
@@ -34,8 +35,13 @@ pub(super) struct FitBounds {
 
 /// The mixes of the chosen shapes.
 pub(super) fn mixer(prepared: &Prepared, shapes: &[usize], settings: &MixSettings, seed: u64) -> Mixer {
-    let network = shapes.iter().map(|&m| prepared.network[m].clone()).collect();
-    Mixer::new(network, prepared.centre_distances.clone(), settings.clone(), seed)
+    Mixer::new(
+        Arc::clone(&prepared.network),
+        shapes.to_vec(),
+        prepared.centre_distances.clone(),
+        settings.clone(),
+        seed,
+    )
 }
 
 /// Numbers of the mixes that the start sees, far from those that batches see.
@@ -181,11 +187,9 @@ pub(super) fn run_fit(
         })
     } else {
         Box::new(ShapesSource::new(
-            shapes
-                .iter()
-                .flat_map(|&m| prepared.network[m].as_flattened())
-                .copied()
-                .collect(),
+            Arc::clone(&prepared.network),
+            shapes.to_vec(),
+            config.seed,
         ))
     };
     let distances = |v: usize| prepared.distances(v);

@@ -94,6 +94,7 @@ fn write_bars(page: &mut String, comparison: &Comparison) {
     let colored = [
         (ProjectionKind::Positions, 0, "fitted in positions"),
         (ProjectionKind::Features, 1, "fitted in features"),
+        (ProjectionKind::LinearEncoder, 3, "by one linear map of the features"),
         (ProjectionKind::Encoder, 2, "by the network's encoder"),
     ];
     for (name, of) in [

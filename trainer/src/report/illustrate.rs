@@ -274,7 +274,8 @@ fn error_table(
     let test = wide(&test);
     // The reference is a training shape for everybody.
     let mut train = vec![prepared.rest.clone()];
-    train.extend(wide(&prepared.aligned));
+    let trained: Vec<Vec<[f32; 3]>> = prepared.aligned.iter().map(<[_]>::to_vec).collect();
+    train.extend(wide(&trained));
     let count = learned.component_count;
     let by_positions = reconstruct_positions(&train, &test, count);
     let features_of = |shapes: &[Vec<[f64; 3]>]| {
@@ -318,7 +319,14 @@ fn error_table(
             false,
         ),
         row(
-            "Sinew, encoder",
+            "Sinew, linear encoder",
+            &ours,
+            &evaluation.linear_encoder,
+            "weights from one linear map of the features",
+            false,
+        ),
+        row(
+            "Sinew, network's encoder",
             &ours,
             &evaluation.encoder,
             "weights from the network in one pass",

@@ -7,7 +7,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use sinew_formats::package::FEATURE_COUNT;
 
-use super::data::{BatchSource, ShapesSource};
+use super::data::{BatchSource, FixedBatch};
 use super::fit::{Engine, FitInput, FitOutcome, FitSettings, Flow, StopReason, TrainingError, fit};
 use super::schedule::Schedule;
 use crate::mesh::topology::{Topology, TopologyFindings};
@@ -291,7 +291,7 @@ fn bad_batches_are_rolled_back_and_many_of_them_end_the_fit() {
     assert!(matches!(error, TrainingError::Diverged { step: 11, .. }), "{error}");
     let error = train(
         &settings(4),
-        &mut ShapesSource::new(vec![0.0; 5]),
+        &mut FixedBatch::new(vec![0.0; 5]),
         &mut falling(),
         None,
         None,
