@@ -5,6 +5,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 
 use sinew_formats::interchange::MeshSequence;
 use sinew_formats::package::CompactView;
+use sinew_trainer::components::painted::{PaintError, PaintedRegion, Vertices};
 use sinew_trainer::config::TrainConfig;
 use sinew_trainer::evaluate::{EvaluationInput, evaluate};
 use sinew_trainer::learn::{LearnError, Learned, Reporter, RunOptions, Silent, learn};
@@ -146,6 +147,45 @@ fn unseen_shapes_are_played_from_few_components() {
     assert!(
         evaluation.round_trip.e_rms < evaluation.position_projection.e_rms,
         "{evaluation:?}"
+    );
+}
+
+#[test]
+fn a_painted_region_has_a_component_of_its_own() {
+    let sequence = bar();
+    let rest = &sequence.shapes[0];
+    let [least, most] = [f32::min, f32::max].map(|of| rest.iter().map(|p| p[0]).reduce(of).expect("a bar"));
+    let tip: Vec<u32> = (0..rest.len())
+        .filter(|&v| rest[v][0] > most - 0.25 * (most - least))
+        .map(|v| v as u32)
+        .collect();
+    let mut config = small();
+    config.start.painted = vec![PaintedRegion {
+        name: "tip".into(),
+        vertices: Vertices::new(tip.clone()),
+    }];
+    let learned = learn(&sequence, &TRAIN, &config, &RunOptions::default(), &Silent).expect("trains");
+    let view = CompactView::open(&learned.package).expect("a package that opens");
+    let painted = view
+        .components()
+        .position(|component| component.name == "tip")
+        .expect("a component of that name");
+    let moved: Vec<u32> = view
+        .entries()
+        .filter(|entry| entry.component == painted)
+        .map(|entry| entry.vertex as u32)
+        .collect();
+    assert!(!moved.is_empty() && moved.iter().all(|v| tip.contains(v)));
+    assert!(
+        view.components().any(|component| component.name.starts_with("tip.")),
+        "what lies below it has its name"
+    );
+
+    config.start.painted[0].vertices = Vertices::new(vec![rest.len() as u32]);
+    let refused = learn(&sequence, &TRAIN, &config, &RunOptions::default(), &Silent);
+    assert!(
+        matches!(refused, Err(LearnError::Paint(PaintError::NoSuchVertex { .. }))),
+        "{refused:?}"
     );
 }
 

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::components::extract::PruneSettings;
 use crate::components::mix::MixSettings;
+use crate::components::painted::PaintedRegion;
 use crate::evaluate::{EncoderSettings, Reading};
 use crate::features::gradient::FeatureSettings;
 use crate::learn::refine::RefineSettings;
@@ -173,6 +174,9 @@ pub struct StartSettings {
     pub centres: usize,
     /// Modes of the position term; 0 leaves the term out.
     pub position_modes: usize,
+    /// Regions that take the place of found ones, each for a coarse component: `[[start.painted]]` with `name` and
+    /// `vertices = "3 10-25"`.
+    pub painted: Vec<PaintedRegion>,
 }
 
 impl Default for StartSettings {
@@ -184,6 +188,7 @@ impl Default for StartSettings {
             root_reach: 0.4,
             centres: 256,
             position_modes: 40,
+            painted: Vec::new(),
         }
     }
 }

@@ -1,11 +1,12 @@
 //! `sinew train`: a folder of meshes in, one compact package out.
 
 use core::time::Duration;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
-use miette::{IntoDiagnostic, WrapErr, miette};
+use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use sinew_formats::package::save_package;
+use sinew_trainer::components::painted::{PaintedRegion, VerticesError};
 use sinew_trainer::config::Recipe;
 use sinew_trainer::learn::{LearnError, RunOptions, learn};
 
@@ -22,6 +23,7 @@ Examples:
   sinew train scans/ -o face.sinew
   sinew train walk/ -o walk.sinew --train-every 10 --time-budget 5m
   sinew train flag/ -o flag.sinew --components 6,4,3
+  sinew train face/ -o face.sinew --paint left-brow.txt --paint right-brow.txt
   sinew train walk/ -o paper.sinew --train-every 10 --recipe paper --time-budget 1h"
 )]
 pub struct TrainArguments {
@@ -39,10 +41,14 @@ pub struct TrainArguments {
     /// Components of each level, coarse to fine: 10,5 makes 10 coarse ones with 5 fine ones under each [default: 10,5]
     #[arg(long, value_name = "K[,K...]", value_delimiter = ',')]
     components: Option<Vec<usize>>,
+    /// Text file with the numbers of vertices, from 0 (`3 10-25`, in any lines): a coarse component of the file's name lives
+    /// there, and its fine ones below it; may be repeated
+    #[arg(long, value_name = "FILE")]
+    paint: Vec<PathBuf>,
     /// Way to train; --config changes what its file names
     #[arg(long, value_enum, value_name = "NAME", default_value_t = Recipe::Local)]
     recipe: Recipe,
-    /// Steps of the optimiser, each on one batch: on all training shapes under --recipe paper [default: 300; paper: 10000]
+    /// Steps of the optimiser, each on one batch; under --recipe paper that is all training shapes, or 256 of them in turns [default: 300; paper: 10000]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     epochs: Option<u32>,
     /// Seed of every random choice [default: 0]
@@ -62,6 +68,21 @@ pub struct TrainArguments {
     restart: bool,
 }
 
+fn read_painted(path: &Path) -> Result<PaintedRegion, Report> {
+    let text = std::fs::read_to_string(path)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot read {}", path.display()))?;
+    let vertices = text.parse().map_err(|VerticesError { line, word }| {
+        miette!(
+            help = "write vertex numbers from 0, one by one or as runs: 3 10-25; # begins a remark",
+            "{}:{line}: `{word}` is no vertex number",
+            path.display()
+        )
+    })?;
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    Ok(PaintedRegion { name, vertices })
+}
+
 /// Runs `sinew train`.
 pub fn run(arguments: &TrainArguments, console: &Console) -> Result<(), Failure> {
     let mut config = read_config(arguments.recipe, arguments.config.as_deref())?;
@@ -73,6 +94,9 @@ pub fn run(arguments: &TrainArguments, console: &Console) -> Result<(), Failure>
     }
     if let Some(seed) = arguments.seed {
         config.seed = seed;
+    }
+    for path in &arguments.paint {
+        config.start.painted.push(read_painted(path)?);
     }
     config.check().into_diagnostic()?;
     check_output(&arguments.output)?;
@@ -122,7 +146,7 @@ pub fn run(arguments: &TrainArguments, console: &Console) -> Result<(), Failure>
             )));
         }
         Err(error) => {
-            return Err(miette::Report::msg(error.to_string())
+            return Err(Report::msg(error.to_string())
                 .wrap_err("cannot train on this sequence")
                 .into());
         }

@@ -1,6 +1,6 @@
 //! Components: where they start (closed form, or random as published), what feeds their training (local mixes, position
 //! modes), how they leave the trained network (extract, prune), and what is seen of them in a package (fields, mirror pairs,
-//! labels, new names).
+//! labels, new names). Regions that the user paints stand in the configuration and steer the start.
 
 pub mod anatomy;
 pub mod extract;
@@ -8,6 +8,7 @@ pub mod fields;
 pub mod labels;
 pub mod mix;
 pub mod modes;
+pub mod painted;
 pub mod position_modes;
 pub mod random_start;
 pub mod regions;

@@ -24,18 +24,40 @@ const SMOOTHING_STEPS: f64 = 20.0;
 const SMOOTHING_VERTICES: f64 = 1504.0;
 
 /// Splits the mesh into `count` regions. Shape: `samples` is flat `[S][V][9]` in network units; the result is `[V]`, each
-/// below `count`. `rounds` k-subspace rounds follow the first clustering.
+/// below `count`. `rounds` k-subspace rounds follow the first clustering. What `painted` names keeps its label, and no other
+/// vertex takes that. Shape: `[V]`, labels from 0 without a gap, fewer than `count` of them.
 pub fn find_regions(
     topology: &Topology,
     rest: &[[f64; 3]],
     samples: &[f32],
+    painted: &[Option<u32>],
     count: usize,
     rounds: usize,
     seed: u64,
 ) -> Vec<u32> {
-    let mut labels = cluster(&descriptors(rest, samples), count, seed);
+    let painted_count = painted.iter().flatten().max().map_or(0, |&most| most as usize + 1);
+    let points = descriptors(rest, samples);
+    let free: Vec<usize> = (0..points.len()).filter(|&v| painted[v].is_none()).collect();
+    let mut labels: Vec<u32> = painted.iter().map(|label| label.unwrap_or(0)).collect();
+    if !free.is_empty() {
+        let free_points: Vec<Vec<f32>> = free.iter().map(|&v| points[v].clone()).collect();
+        let found = cluster(&free_points, count - painted_count, seed);
+        for (&v, label) in free.iter().zip(found) {
+            labels[v] = label + painted_count as u32;
+        }
+    }
+    let keep = |own: &[u32], next: Vec<u32>| -> Vec<u32> {
+        let pairs = own.iter().zip(next).zip(painted);
+        pairs
+            .map(|((&own, next), painted)| match painted {
+                Some(label) => *label,
+                None if (next as usize) < painted_count => own,
+                None => next,
+            })
+            .collect()
+    };
     for _ in 0..rounds {
-        let next = assign_by_subspace(topology, samples, &labels, count);
+        let next = keep(&labels, assign_by_subspace(topology, samples, &labels, count));
         if next == labels {
             break;
         }

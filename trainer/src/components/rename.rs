@@ -103,7 +103,8 @@ pub fn new_names(package: &CompactView<'_>, pairs: &[(String, String)]) -> Resul
     Ok(names)
 }
 
-fn is_name(text: &str) -> bool {
+/// Whether a text is made as names are.
+pub(super) fn is_name(text: &str) -> bool {
     text.len() <= limits::NAME_BYTES
         && text.starts_with(char::is_alphabetic)
         && text.chars().all(|c| c.is_alphanumeric() || "-_.".contains(c))

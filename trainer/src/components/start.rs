@@ -25,6 +25,8 @@ pub struct StartInput<'a> {
     pub rest: &'a [[f64; 3]],
     /// Mixes in network units. Shape: flat `[S][V][9]`.
     pub samples: &'a [f32],
+    /// The painted region of a vertex, each the place of one root component. Shape: `[V]`, fewer labels than root components.
+    pub painted: &'a [Option<u32>],
     /// K of each level, coarse to fine; none is 0.
     pub component_counts: &'a [usize],
     /// How residuals are shared out among the blocks below.
@@ -45,15 +47,32 @@ pub fn closed_form_start(input: &StartInput<'_>, distances: &(dyn Fn(usize) -> V
         input.topology,
         input.rest,
         input.samples,
+        input.painted,
         root_count,
         input.rounds,
         input.seed,
     );
-    let windows = soft_windows(input.topology, &labels, root_count);
+    let mut windows = soft_windows(input.topology, &labels, root_count);
+    let painted_count = input
+        .painted
+        .iter()
+        .flatten()
+        .max()
+        .map_or(0, |&most| most as usize + 1);
+    for (region, window) in windows.iter_mut().enumerate().take(painted_count) {
+        let outside = |label: &Option<u32>| *label != Some(region as u32);
+        let places = window.iter_mut().zip(input.painted);
+        places.filter(|(_, label)| outside(label)).for_each(|(w, _)| *w = 0.0);
+    }
     let mut rows: Vec<Vec<f32>> = windows
         .par_iter()
-        .map(|window| {
+        .enumerate()
+        .map(|(region, window)| {
             let mut row = windowed_modes(input.samples, vertex_count, window, 1).remove(0);
+            // A painted region reaches as far as it is painted.
+            if region < painted_count {
+                return row;
+            }
             let centre = strongest_vertex(&row);
             let distance = distances(centre);
             for (x, &d) in row.chunks_exact_mut(9).zip(&distance) {
@@ -65,6 +84,12 @@ pub fn closed_form_start(input: &StartInput<'_>, distances: &(dyn Fn(usize) -> V
         })
         .collect();
     orthonormalise(&mut rows);
+    for (region, row) in rows.iter_mut().enumerate().take(painted_count) {
+        let places = row.chunks_exact_mut(9).zip(input.painted);
+        places
+            .filter(|(_, label)| **label != Some(region as u32))
+            .for_each(|(x, _)| x.fill(0.0));
+    }
 
     let mut levels = vec![LevelWeights {
         component_count: root_count,

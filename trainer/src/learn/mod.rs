@@ -21,8 +21,9 @@ use sinew_formats::interchange::MeshSequence;
 use sinew_formats::package::{AlignedBytes, Quality, WriteError};
 
 use crate::bake::BakeError;
+use crate::components::painted::{PaintError, painted_labels};
 use crate::components::position_modes::{keep_linear_algebra_serial, position_modes};
-use crate::config::TrainConfig;
+use crate::config::{StartKind, TrainConfig};
 use crate::evaluate::PlayError;
 use crate::mesh::sparse_factor::FactorError;
 use crate::training::fit::{FitOutcome, HistoryPoint, TrainingError};
@@ -121,6 +122,9 @@ pub enum LearnError {
         /// N.
         shapes: usize,
     },
+    /// A painted region does not fit the mesh or the components.
+    #[error(transparent)]
+    Paint(#[from] PaintError),
     /// Features go to a file where they are many, and there is no room for it.
     #[error(
         "the features of the training shapes cannot be kept in {}: {source}; make room there, or name another folder in TMPDIR",
@@ -174,6 +178,10 @@ pub fn learn(
 ) -> Result<Learned, LearnError> {
     keep_linear_algebra_serial();
     let started = Instant::now();
+    painted_labels(&config.start.painted, sequence.vertex_count(), config.components[0])?;
+    if config.start.kind == StartKind::Random && !config.start.painted.is_empty() {
+        return Err(PaintError::RandomStart.into());
+    }
     let reviewed = review(sequence, train_shapes, config.component_count())?;
     reviewed.notices.iter().for_each(|notice| reporter.notice(notice));
     let prepared = Prepared::new(sequence, &reviewed.shapes, config, reporter)?;

@@ -11,6 +11,8 @@ use super::prepare::Prepared;
 use super::stages::mixer;
 use crate::bake::{BakeError, Surface, bake};
 use crate::components::extract::LearnedBasis;
+use crate::components::painted::name_painted;
+use crate::components::rename::RenameError;
 use crate::config::TrainConfig;
 use crate::evaluate::{FeatureDecoder, FeatureMetric, FeatureProjection, PlayError, Player, ScoreError, StackEncoder};
 use crate::network::weights::StackWeights;
@@ -25,6 +27,9 @@ pub enum PackageError {
     /// It cannot be baked.
     #[error("the package cannot be baked: {0}")]
     Bake(#[from] BakeError),
+    /// Its components cannot be named.
+    #[error("the components of painted regions cannot be named: {0}")]
+    Name(#[from] RenameError),
     /// What was just written does not open.
     #[error("the package does not open: {0}")]
     Open(#[from] OpenError),
@@ -134,6 +139,7 @@ pub fn package(
         train_shapes: &numbers,
     };
     let bytes = basis.with_records(provenance, quality, write_compact)?;
+    let bytes = name_painted(bytes, &config.start.painted)?;
     Ok((bytes, component_count, removed_count))
 }
 

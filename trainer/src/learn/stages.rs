@@ -9,6 +9,7 @@ use super::prepare::Prepared;
 use super::run_folder::{Plan, RunFolder};
 use super::{LearnError, Reporter, package};
 use crate::components::mix::{MixSettings, Mixer};
+use crate::components::painted::painted_labels;
 use crate::components::random_start::random_start;
 use crate::components::start::{StartInput, closed_form_start};
 use crate::config::{StartKind, TrainConfig};
@@ -90,11 +91,13 @@ fn start_of_seed(
     mixes: &MixSettings,
     seed: u64,
 ) -> Result<StackWeights, LearnError> {
+    let painted = painted_labels(&config.start.painted, prepared.rest.len(), config.components[0])?;
     let samples = mixer(prepared, shapes, mixes, seed).mixes(START_MIXES, config.start.samples);
     let input = StartInput {
         topology: &prepared.topology,
         rest: &prepared.rest,
         samples: &samples,
+        painted: &painted,
         component_counts: &config.components,
         attention: config.fit.attention,
         // What mixes move as one is not cut into pieces.
