@@ -296,6 +296,25 @@ fn methods_are_compared_on_one_split() {
         "{last}"
     );
     assert!(folder.path().join("report/index.html").exists());
+    // Two of ours are told apart by their files.
+    let other = at("other.sinew");
+    std::fs::copy(&model, &other).expect("a copy");
+    let mut arguments = vec![
+        "compare",
+        &bar,
+        "--train-every",
+        "3",
+        "--ours",
+        &model,
+        "--ours",
+        &other,
+    ];
+    arguments.extend(common);
+    let table = run(&arguments);
+    assert!(
+        table.contains("Sinew, bar") && table.contains("Sinew, other"),
+        "{table}"
+    );
     // Another split would not be the same test.
     refused(
         &["compare", &bar, "--train-every", "4", "--ours", &model, "-q"],

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 use miette::{IntoDiagnostic, WrapErr, miette};
 use sinew_formats::package::CompactView;
-use sinew_trainer::compare::{CompareError, CompareInput, CompareSettings, Comparison, LOCAL_RADIUS, compare};
+use sinew_trainer::compare::{
+    CompareError, CompareInput, CompareSettings, Comparison, LOCAL_RADIUS, OwnPackage, compare,
+};
 use sinew_trainer::config::TrainConfig;
 use sinew_trainer::learn::LearnError;
 use sinew_trainer::report::compare_page::comparison_page;
@@ -24,7 +26,7 @@ use super::{Failure, check_output, chosen_shapes, load_package, load_sequence, m
   Deformation gradients   Huang et al. 2014
   Lengths and angles      Wang et al. 2017
   One-level autoencoder   Tan et al. 2018
-  Sinew                   this project, or --ours PACKAGE
+  Sinew                   this project, or each --ours PACKAGE
 
 Weights of unseen shapes are found by a network's encoder, by least squares in features (which count what they do to positions \
         too, for every method), or by least squares in positions: \
@@ -49,9 +51,10 @@ pub struct CompareArguments {
     /// Epochs of the one-level autoencoder at most: it ends when its loss stays level
     #[arg(long, value_name = "N", default_value_t = 5000, value_parser = clap::value_parser!(u32).range(1..))]
     epochs: u32,
-    /// A package trained on the same shapes, to stand for this project's own training
+    /// A package trained on the same shapes, to stand for this project's own training; may be repeated, for one of --recipe paper
+    /// beside it
     #[arg(long, value_name = "PACKAGE")]
-    ours: Option<PathBuf>,
+    ours: Vec<PathBuf>,
     /// Leave out what takes longest: peers fitted in positions, and control points
     #[arg(long)]
     quick: bool,
@@ -74,12 +77,17 @@ pub fn run(arguments: &CompareArguments, console: &Console) -> Result<(), Failur
     }
     let sequence = load_sequence(&arguments.sequence, console)?;
     let train_shapes = chosen_shapes(arguments.train_every as usize, None, sequence.shape_count())?;
-    let ours = match &arguments.ours {
-        Some(path) => Some((path, load_package(path)?)),
-        None => None,
-    };
     let mut config = TrainConfig::default();
-    if let Some((path, bytes)) = &ours {
+    let mut ours = Vec::new();
+    for path in &arguments.ours {
+        let bytes = load_package(path)?;
+        let name = match &arguments.ours[..] {
+            [_] => "Sinew".to_owned(),
+            _ => format!("Sinew, {}", path.file_stem().unwrap_or_default().to_string_lossy()),
+        };
+        ours.push((path, name, bytes));
+    }
+    for (n, (path, _, bytes)) in ours.iter().enumerate() {
         let refuse = || format!("{} is no usable compact package", path.display());
         let view = CompactView::open(bytes).into_diagnostic().wrap_err_with(refuse)?;
         let trained_on = view.provenance().train_shapes;
@@ -91,7 +99,9 @@ pub fn run(arguments: &CompareArguments, console: &Console) -> Result<(), Failur
             )
             .into());
         }
-        config = config_of(&view)?;
+        if n == 0 {
+            config = config_of(&view)?;
+        }
     }
     config.seed = arguments.seed;
     let settings = CompareSettings {
@@ -100,11 +110,12 @@ pub fn run(arguments: &CompareArguments, console: &Console) -> Result<(), Failur
         quick: arguments.quick,
         config,
     };
+    let ours: Vec<OwnPackage<'_>> = ours.iter().map(|(_, name, bytes)| OwnPackage { name, bytes }).collect();
     console.catch_interrupts();
     let input = CompareInput {
         sequence: &sequence,
         train_shapes: &train_shapes,
-        ours: ours.as_ref().map(|(_, bytes)| &bytes[..]),
+        ours: &ours,
         settings: &settings,
     };
     let compared = compare(input, console);

@@ -342,8 +342,11 @@ impl Run<'_, '_> {
             ours,
         } = self.bench.input;
         let (name, source) = ("Sinew", "two levels, this project");
-        if let Some(package) = ours {
-            return self.package(name, source, package, Cost::default(), None);
+        if !ours.is_empty() {
+            for own in ours {
+                self.package(own.name, source, own.bytes, Cost::default(), None)?;
+            }
+            return Ok(());
         }
         self.begin(name)?;
         let mut config = settings.config.clone();

@@ -34,10 +34,19 @@ pub struct CompareInput<'a> {
     pub sequence: &'a MeshSequence,
     /// Shapes to train on, ascending; shape 0 is the reference either way.
     pub train_shapes: &'a [usize],
-    /// A compact package trained on just these, to stand for this project's own training.
-    pub ours: Option<&'a [u8]>,
+    /// Compact packages trained on just these, to stand for this project's own training; none trains one.
+    pub ours: &'a [OwnPackage<'a>],
     /// How.
     pub settings: &'a CompareSettings,
+}
+
+/// A package of this project.
+#[derive(Debug, Clone, Copy)]
+pub struct OwnPackage<'a> {
+    /// For the tables.
+    pub name: &'a str,
+    /// A compact package.
+    pub bytes: &'a [u8],
 }
 
 /// How methods are trained and fitted.

@@ -43,7 +43,7 @@ fn run(threads: usize, quick: bool) -> (Comparison, ComparedShapes) {
         let input = CompareInput {
             sequence: &sequence,
             train_shapes: &[0, 3, 6, 9],
-            ours: None,
+            ours: &[],
             settings: &small(quick),
         };
         compare(input, &Silent).expect("a comparison")
@@ -142,7 +142,7 @@ fn a_split_that_leaves_nothing_is_refused() {
     let input = |train_shapes| CompareInput {
         sequence: &sequence,
         train_shapes,
-        ours: None,
+        ours: &[],
         settings: &settings,
     };
     assert!(matches!(
