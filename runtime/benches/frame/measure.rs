@@ -88,12 +88,15 @@ impl Contest<'_, '_> {
             start.elapsed().as_secs_f64() * 1e6
         };
         let in_a_row = self.settings.in_a_row && !self.cold;
-        if in_a_row {
+        let turns = if in_a_row {
             for (contender, samples) in self.contenders.iter_mut().zip(&mut samples) {
                 samples.extend((0..rounds).map(|round| timed(contender, round)));
             }
-        }
-        for round in if in_a_row { 0..0 } else { 0..rounds } {
+            0
+        } else {
+            rounds
+        };
+        for round in 0..turns {
             for (contender, samples) in self.contenders.iter_mut().zip(&mut samples) {
                 if self.cold {
                     flush.iter_mut().for_each(|word| *word = word.wrapping_mul(3));

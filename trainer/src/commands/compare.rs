@@ -28,9 +28,9 @@ use super::{Failure, check_output, chosen_shapes, load_package, load_sequence, m
   One-level autoencoder   Tan et al. 2018
   Sinew                   this project, or each --ours PACKAGE
 
-Weights of unseen shapes are found by a network's encoder, by least squares in features (which count what they do to positions \
-        too, for every method), or by least squares in positions: \
-        compare like with like. Less is better in E_rms and STED; more is better in locality.
+Weights of unseen shapes are found by a network's encoder, by the pseudo-inverse of its decoder (a linear map), by least squares \
+in features (which count what they do to positions too, for every method), or by least squares in positions: compare like \
+with like. Less is better in E_rms and STED; more is better in locality.
 
 Examples:
   sinew compare horse/ --train-every 10 --report horse-comparison

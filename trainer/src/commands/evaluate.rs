@@ -18,7 +18,7 @@ use super::{Failure, chosen_shapes, load_package, load_sequence, make_folder};
 #[command(
     after_help = "Four ways to find the weights of an unseen shape, all with the same components and all played by the runtime:
   network's encoder    level by level as the paper has it, attention shares out what is left
-  linear encoder       one fixed map of the features: the pseudo-inverse of the decoder at rest
+  linear encoder       one least-squares step from rest: the pseudo-inverse of the decoder there
   feature projection   least squares on features and, to first order, positions, from there
   position projection  Gauss-Newton on positions, from there: what the components can do
 and the round trip: features to positions without components, below which no figure can fall.

@@ -134,7 +134,7 @@ pub struct Projection {
 pub enum ProjectionKind {
     /// A network's own encoder.
     Encoder,
-    /// One linear map of the features: the pseudo-inverse of the decoder at rest.
+    /// One pass of least squares: the pseudo-inverse of the decoder at rest, in the metric of `Features`.
     LinearEncoder,
     /// Least squares in features and, to first order at the reference, in what they do to positions.
     Features,

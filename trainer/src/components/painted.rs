@@ -5,9 +5,9 @@ use core::fmt;
 use core::str::FromStr;
 
 use serde::{Deserialize, Serialize};
-use sinew_formats::package::{AlignedBytes, CompactView, NONE};
+use sinew_formats::package::{CompactView, NONE};
 
-use super::rename::{RenameError, is_name, is_place, new_names, places, renamed};
+use super::rename::{is_name, is_place, places};
 
 /// A named set of vertices.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -49,7 +49,7 @@ pub enum PaintError {
     NoSuchVertex {
         /// The region.
         name: String,
-        /// Its greatest vertex.
+        /// Its first vertex that is not there.
         vertex: u32,
         /// V.
         vertex_count: usize,
@@ -75,7 +75,7 @@ pub enum PaintError {
     SameName(String),
     /// No component is left for the rest of the mesh.
     #[error(
-        "{painted} regions are painted and there are {coarse} coarse components: one at least must be left for the rest"
+        "painted regions: {painted}, coarse components: {coarse}; one of these at least must be left for the rest of the mesh"
     )]
     TooMany {
         /// Regions.
@@ -107,8 +107,8 @@ impl FromStr for Vertices {
 
     /// Numbers and runs, apart by spaces, commas or line ends; what follows a `#` is a remark.
     fn from_str(text: &str) -> Result<Self, VerticesError> {
-        /// More than any mesh here has; a run beyond it is a slip of the pen.
-        const MOST: u32 = 1 << 26;
+        /// More than any mesh here has; more numbers, or greater ones, are a slip of the pen.
+        const MOST: u32 = 1 << 24;
         let mut vertices = Vec::new();
         for (n, line) in text.lines().enumerate() {
             let line_text = line.split('#').next().unwrap_or_default();
@@ -121,7 +121,7 @@ impl FromStr for Vertices {
                 let (first, last) = word.split_once('-').unwrap_or((word, word));
                 let [first, last] = [first, last].map(|number| number.parse::<u32>().ok().filter(|&v| v < MOST));
                 let (first, last) = first.zip(last).ok_or_else(fail)?;
-                if first > last {
+                if first > last || vertices.len() + (last - first) as usize >= MOST as usize {
                     return Err(fail());
                 }
                 vertices.extend(first..=last);
@@ -203,52 +203,45 @@ pub fn painted_labels(
     Ok(labels)
 }
 
-/// Names the coarse components that live on painted regions alone, `ear`, and what lies below them, `ear.0`.
-/// Errors: a name that cannot be one.
-pub fn name_painted(package: AlignedBytes, regions: &[PaintedRegion]) -> Result<AlignedBytes, RenameError> {
-    let Ok(view) = CompactView::open(&package) else {
-        return Ok(package);
-    };
-    let vertex_count = view.vertex_count();
-    let inside: Vec<Vec<bool>> = regions
-        .iter()
-        .map(|region| {
-            let mut inside = vec![false; vertex_count];
-            for &v in region.vertices.as_slice() {
-                if let Some(inside) = inside.get_mut(v as usize) {
-                    *inside = true;
-                }
-            }
-            inside
-        })
+/// How many regions the labels of [`painted_labels`] name.
+pub fn region_count(labels: &[Option<u32>]) -> usize {
+    labels.iter().flatten().max().map_or(0, |&most| most as usize + 1)
+}
+
+/// Places and new names of the coarse component that lives on each painted region alone, `ear`, and of what lies below it,
+/// `ear.0`. Of several it is the one that moves most vertices; a region where nothing lives gives no name. The regions are those of
+/// [`painted_labels`], of the package's mesh.
+pub fn painted_names(view: &CompactView<'_>, regions: &[PaintedRegion]) -> Vec<(String, String)> {
+    let places = places(view);
+    let roots: Vec<usize> = view
+        .blocks()
+        .filter(|block| block.parent_component == NONE)
+        .flat_map(|block| (0..block.component_count).map(move |i| (block.first_component + i) as usize))
         .collect();
-    let mut lives_on = vec![vec![true; regions.len()]; view.component_count()];
-    for entry in view.entries() {
-        for (lives, inside) in lives_on[entry.component].iter_mut().zip(&inside) {
-            *lives &= inside[entry.vertex];
-        }
-    }
-    let places = places(&view);
     let mut names = Vec::new();
-    for block in view.blocks().filter(|block| block.parent_component == NONE) {
-        let first = block.first_component as usize;
-        for k in first..first + block.component_count as usize {
-            let Some(region) = lives_on[k].iter().position(|&lives| lives) else {
-                continue;
-            };
-            let below = format!("{}.", places[k]);
-            for place in &places {
-                if let Some(rest) = place.strip_prefix(&below) {
-                    names.push((place.clone(), format!("{}.{rest}", regions[region].name)));
-                }
-            }
-            names.push((places[k].clone(), regions[region].name.clone()));
+    for region in regions {
+        let mut inside = vec![false; view.vertex_count()];
+        for &v in region.vertices.as_slice() {
+            inside[v as usize] = true;
         }
+        // Vertices that a component moves; none once it moves one outside.
+        let mut moved = vec![Some(0_usize); view.component_count()];
+        for entry in view.entries() {
+            let count = &mut moved[entry.component];
+            *count = count.filter(|_| inside[entry.vertex]).map(|count| count + 1);
+        }
+        let living = roots.iter().filter(|&&k| moved[k].is_some_and(|count| count > 0));
+        let Some(&root) = living.max_by_key(|&&k| (moved[k], core::cmp::Reverse(k))) else {
+            continue;
+        };
+        names.push((places[root].clone(), region.name.clone()));
+        let below = format!("{}.", places[root]);
+        names.extend(places.iter().filter_map(|place| {
+            let rest = place.strip_prefix(&below)?;
+            Some((place.clone(), format!("{}.{rest}", region.name)))
+        }));
     }
-    if names.is_empty() {
-        return Ok(package);
-    }
-    renamed(&view, &new_names(&view, &names)?)
+    names
 }
 
 #[cfg(test)]
@@ -273,6 +266,7 @@ mod tests {
             ("5-2", 1, "5-2"),
             ("-4", 1, "-4"),
             ("0-4000000000", 1, "0-4000000000"),
+            ("0-9000000\n0-9000000", 2, "0-9000000"),
         ] {
             let expected = VerticesError {
                 line,

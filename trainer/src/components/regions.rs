@@ -8,6 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::modes::{WeightedSamples, columns};
+use super::painted::region_count;
 use crate::mesh::topology::Topology;
 
 /// How strongly the first clustering weighs where a vertex is against how it turns.
@@ -35,7 +36,7 @@ pub fn find_regions(
     rounds: usize,
     seed: u64,
 ) -> Vec<u32> {
-    let painted_count = painted.iter().flatten().max().map_or(0, |&most| most as usize + 1);
+    let painted_count = region_count(painted);
     let points = descriptors(rest, samples);
     let free: Vec<usize> = (0..points.len()).filter(|&v| painted[v].is_none()).collect();
     let mut labels: Vec<u32> = painted.iter().map(|label| label.unwrap_or(0)).collect();

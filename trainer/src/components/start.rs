@@ -6,6 +6,7 @@ use faer::{Mat, Side};
 use rayon::prelude::*;
 
 use super::modes::WeightedSamples;
+use super::painted::region_count;
 use super::regions::{find_regions, soft_windows};
 use crate::mesh::topology::Topology;
 use crate::network::attention::Attention;
@@ -53,12 +54,7 @@ pub fn closed_form_start(input: &StartInput<'_>, distances: &(dyn Fn(usize) -> V
         input.seed,
     );
     let mut windows = soft_windows(input.topology, &labels, root_count);
-    let painted_count = input
-        .painted
-        .iter()
-        .flatten()
-        .max()
-        .map_or(0, |&most| most as usize + 1);
+    let painted_count = region_count(input.painted);
     for (region, window) in windows.iter_mut().enumerate().take(painted_count) {
         let outside = |label: &Option<u32>| *label != Some(region as u32);
         let places = window.iter_mut().zip(input.painted);

@@ -55,7 +55,8 @@ pub struct Evaluation {
     pub components: ComponentCounts,
     /// Weights from the network's encoder: level by level, residuals shared out by attention.
     pub encoder: Scores,
-    /// Weights from one linear map of the features, the pseudo-inverse of the whole decoder at rest.
+    /// Weights from one pass of least squares: the pseudo-inverse of the whole decoder at rest, in the metric of
+    /// [`FeatureMetric`].
     pub linear_encoder: Scores,
     /// Weights by least squares in feature space, in the metric of [`FeatureMetric`].
     pub feature_projection: Scores,

@@ -154,8 +154,9 @@ impl<'a> FeatureProjection<'a> {
         }
     }
 
-    /// Weights in one pass, without a search: least squares of the decoder as it is at the reference, where tanh is the
-    /// identity. Shapes: `features` `[V]`, source order; the answer `[K]`.
+    /// Weights in one pass, without a search: least squares of the decoder made linear at the reference, in the metric of
+    /// [`Self::weights`] (linear in the features but for how much this shape's positions count). Zeros where nothing can be
+    /// solved. Shapes: `features` `[V]`, source order; the answer `[K]`.
     pub fn linear_weights(&self, features: &[[f32; FEATURE_COUNT]]) -> Vec<f64> {
         let mut misfit = self.misfit(features);
         let Ok(equations) = misfit.linearise(&vec![0.0; self.decoder.component_count]);
@@ -175,8 +176,8 @@ impl<'a> FeatureProjection<'a> {
         }
     }
 
-    /// Weights that bring `|X - Xhat(z)|` of the metric down, from `start` ([`Self::linear_weights`], or any). Shapes: `features` `[V]`, source
-    /// order; `start` `[K]`. Stretch counts as it stands in network units, already down-weighted.
+    /// Weights that bring `|X - Xhat(z)|` of the metric down, from `start` ([`Self::linear_weights`], or any).
+    /// Shapes: `features` `[V]`, source order; `start` `[K]`. Stretch counts as it stands in network units, already down-weighted.
     pub fn weights(&self, features: &[[f32; FEATURE_COUNT]], start: Vec<f64>) -> Vec<f64> {
         let mut misfit = self.misfit(features);
         let Ok(weights) = descend(&mut misfit, start, &DESCENT);

@@ -18,7 +18,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use sinew_formats::interchange::MeshSequence;
-use sinew_formats::package::{AlignedBytes, Quality, WriteError};
+use sinew_formats::package::{AlignedBytes, CompactView, Quality, WriteError};
 
 use crate::bake::BakeError;
 use crate::components::painted::{PaintError, painted_labels};
@@ -132,7 +132,6 @@ pub enum LearnError {
     )]
     Store {
         /// As it says.
-        #[from]
         source: std::io::Error,
     },
     /// The mesh's matrix cannot be factored.
@@ -317,6 +316,15 @@ fn finish(
         quality,
     )?;
     reporter.advance(1, "");
+    let view = CompactView::open(&package).map_err(PackageError::from)?;
+    for region in &config.start.painted {
+        if !view.components().any(|component| component.name == region.name) {
+            reporter.notice(&format!(
+                "no component is called `{}`: too little moves on that painted region to be worth one",
+                region.name
+            ));
+        }
+    }
     Ok(Learned {
         package,
         component_count,

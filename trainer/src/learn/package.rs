@@ -11,8 +11,8 @@ use super::prepare::Prepared;
 use super::stages::mixer;
 use crate::bake::{BakeError, Surface, bake};
 use crate::components::extract::LearnedBasis;
-use crate::components::painted::name_painted;
-use crate::components::rename::RenameError;
+use crate::components::painted::painted_names;
+use crate::components::rename::{RenameError, new_names, renamed};
 use crate::config::TrainConfig;
 use crate::evaluate::{FeatureDecoder, FeatureMetric, FeatureProjection, PlayError, Player, ScoreError, StackEncoder};
 use crate::network::weights::StackWeights;
@@ -139,7 +139,13 @@ pub fn package(
         train_shapes: &numbers,
     };
     let bytes = basis.with_records(provenance, quality, write_compact)?;
-    let bytes = name_painted(bytes, &config.start.painted)?;
+    let view = CompactView::open(&bytes)?;
+    let names = painted_names(&view, &config.start.painted);
+    let bytes = if names.is_empty() {
+        bytes
+    } else {
+        renamed(&view, &new_names(&view, &names)?)?
+    };
     Ok((bytes, component_count, removed_count))
 }
 
@@ -148,10 +154,9 @@ const NUMBER_OF_RANGE_MIXES: u64 = 1 << 41;
 /// Mixes whose weights count for the stops of the controls.
 const RANGE_MIXES: usize = 32;
 
-/// The stops of every control: the least and greatest weight of the training shapes (of 256, where there are more) and of mixes of them, 0
-/// included. A
-/// handful of poses alone would leave most controls one-sided. While training goes on the encoder finds the weights, which
-/// is quick.
+/// The stops of every control: the least and greatest weight of the training shapes (of 256, where there are more) and of mixes
+/// of them, 0 included. A handful of poses alone would leave most controls one-sided. While training goes on the encoder finds
+/// the weights, which is quick.
 fn measure_ranges(
     basis: &mut LearnedBasis,
     prepared: &Prepared,

@@ -189,8 +189,9 @@ fn read_shapes(
     reporter: &dyn Reporter,
 ) -> Result<ReadShapes, LearnError> {
     let vertex_count = rest.len();
-    let mut aligned = ShapeStore::<3>::zeros(shapes.len(), vertex_count, MAPPED_FROM_BYTES)?;
-    let mut deviations = ShapeStore::<9>::zeros(shapes.len(), vertex_count, MAPPED_FROM_BYTES)?;
+    let full = |source| LearnError::Store { source };
+    let mut aligned = ShapeStore::<3>::zeros(shapes.len(), vertex_count, MAPPED_FROM_BYTES).map_err(full)?;
+    let mut deviations = ShapeStore::<9>::zeros(shapes.len(), vertex_count, MAPPED_FROM_BYTES).map_err(full)?;
     let mapped = aligned.mapped_bytes().unwrap_or(0) + deviations.mapped_bytes().unwrap_or(0);
     if mapped > 0 {
         reporter.notice(&format!(

@@ -22,7 +22,7 @@ use sinew_formats::interchange::MeshSequence;
 type V3 = Vector3<f64>;
 
 /// Frames accepted by every subject. Two shapes are the least a sequence can have.
-pub const FRAME_RANGE: RangeInclusive<usize> = 2..=100_000;
+pub const FRAME_RANGE: RangeInclusive<usize> = 2..=20_000;
 /// Time between two frames, in seconds.
 pub const FRAME_SECONDS: f64 = 1.0 / 30.0;
 
