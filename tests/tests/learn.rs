@@ -4,7 +4,10 @@
 use core::sync::atomic::{AtomicU64, Ordering};
 
 use sinew_formats::interchange::MeshSequence;
-use sinew_formats::package::CompactView;
+use sinew_formats::package::{CompactView, save_package};
+use sinew_trainer::bake::Surface;
+use sinew_trainer::components::fields::{Response, responses_of};
+use sinew_trainer::components::kept::{KeepError, KeptComponent};
 use sinew_trainer::components::painted::{PaintError, PaintedRegion, Vertices};
 use sinew_trainer::config::TrainConfig;
 use sinew_trainer::evaluate::{EvaluationInput, evaluate};
@@ -185,6 +188,79 @@ fn a_painted_region_has_a_component_of_its_own() {
     let refused = learn(&sequence, &TRAIN, &config, &RunOptions::default(), &Silent);
     assert!(
         matches!(refused, Err(LearnError::Paint(PaintError::NoSuchVertex { .. }))),
+        "{refused:?}"
+    );
+}
+
+/// Rows pass through half precision twice, and through another scaling of features.
+const KEPT_COSINE: f64 = 0.9999;
+
+#[test]
+fn a_kept_component_stays_what_it_was() {
+    let sequence = bar();
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let package = folder.path().join("old.sinew");
+    let old = learn(&sequence, &TRAIN, &small(), &RunOptions::default(), &Silent).expect("trains");
+    save_package(&package, &old.package).expect("a file");
+    let mut config = small();
+    config.seed = 5;
+    config.scaling.rotation_reach = 0.3;
+    let keep = |component: &str, name: &str| KeptComponent {
+        name: name.into(),
+        package: package.clone(),
+        component: component.into(),
+    };
+    config.start.kept = vec![keep("c1", "bend"), keep("c0.0", "detail")];
+    let new = learn(&sequence, &TRAIN, &config, &RunOptions::default(), &Silent).expect("trains");
+    let responses = |bytes: &[u8]| -> Vec<(String, Response)> {
+        let view = CompactView::open(bytes).expect("a package that opens");
+        let responses = responses_of(&view, &Surface::of_package(&view));
+        let names = view.components().map(|component| component.name.to_owned());
+        names.zip(responses).collect()
+    };
+    let dense = |all: &[(String, Response)], name: &str| -> Vec<f64> {
+        let (_, response) = all
+            .iter()
+            .find(|(other, _)| other == name)
+            .expect("a component of that name");
+        let mut dense = vec![0.0; 9 * sequence.vertex_count()];
+        for (&v, x) in response.vertices.iter().zip(&response.values) {
+            dense[9 * v as usize..][..9].copy_from_slice(x);
+        }
+        dense
+    };
+    let (before, after) = (responses(&old.package), responses(&new.package));
+    for (component, name) in [("c1", "bend"), ("c0.0", "detail")] {
+        let (a, b) = (dense(&before, component), dense(&after, name));
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let cosine = dot(&a, &b) / (dot(&a, &a) * dot(&b, &b)).sqrt();
+        assert!(cosine > KEPT_COSINE, "{component}: {cosine}");
+    }
+    assert!(
+        after.iter().any(|(name, _)| name.starts_with("bend.")),
+        "what lies below it has its name"
+    );
+
+    let refusal = |kept: KeptComponent| {
+        let mut config = small();
+        config.start.kept = vec![kept];
+        let refused = learn(&sequence, &TRAIN, &config, &RunOptions::default(), &Silent);
+        refused.expect_err("nothing to keep").to_string()
+    };
+    assert!(refusal(keep("c77", "x")).contains("has no component `c77`: it has c0"));
+    assert!(refusal(keep("c1", "c1")).contains("`c1` cannot name a kept component"));
+    let absent = KeptComponent {
+        package: folder.path().join("absent.sinew"),
+        ..keep("c1", "x")
+    };
+    assert!(refusal(absent).contains("absent.sinew"));
+    let mut config = small();
+    config.start.kept = vec![keep("c1", "x")];
+    let mut other = sequence.clone();
+    other.shapes.iter_mut().for_each(|shape| shape[7][1] += 0.2);
+    let refused = learn(&other, &TRAIN, &config, &RunOptions::default(), &Silent);
+    assert!(
+        matches!(&refused, Err(LearnError::Keep(KeepError::Mesh { difference, .. })) if difference.contains("vertex 7")),
         "{refused:?}"
     );
 }

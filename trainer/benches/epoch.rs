@@ -97,6 +97,7 @@ impl Subject {
             topology: &self.topology,
             vertex_weights: &self.vertex_weights(),
             position_modes: &[],
+            kept_roots: 0..0,
             distances: &distances,
         };
         let settings = FitSettings {

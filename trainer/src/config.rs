@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::components::extract::PruneSettings;
+use crate::components::kept::KeptComponent;
 use crate::components::mix::MixSettings;
 use crate::components::painted::PaintedRegion;
 use crate::evaluate::{EncoderSettings, Reading};
@@ -177,6 +178,9 @@ pub struct StartSettings {
     /// Regions that take the place of found ones, each for a coarse component: `[[start.painted]]` with `name` and
     /// `vertices = "3 10-25"`.
     pub painted: Vec<PaintedRegion>,
+    /// Components of older packages of the same mesh that each stay as a coarse component: `[[start.kept]]` with `name`,
+    /// `package` and `component`.
+    pub kept: Vec<KeptComponent>,
 }
 
 impl Default for StartSettings {
@@ -189,6 +193,7 @@ impl Default for StartSettings {
             centres: 256,
             position_modes: 40,
             painted: Vec::new(),
+            kept: Vec::new(),
         }
     }
 }

@@ -158,6 +158,7 @@ pub fn train(
         topology: &prepared.topology,
         vertex_weights: &vec![1.0; vertex_count],
         position_modes: &[],
+        kept_roots: 0..0,
         distances: &distances,
     };
     let (mut plateau, mut level, mut asked) = (Plateau::default(), false, false);
@@ -230,7 +231,7 @@ mod tests {
             .build()
             .expect("threads");
         pool.install(|| {
-            let prepared = Prepared::new(&sequence, &train_shapes, &config, &Silent).expect("a usable bar");
+            let prepared = Prepared::new(&sequence, &train_shapes, &config, &[], &Silent).expect("a usable bar");
             let (bytes, training) = train(&prepared, &config, &tan, "bar", &train_shapes, 6, &Silent).expect("trains");
             assert_eq!((training.epochs, training.level), (epochs, false));
             let input = EvaluationInput {

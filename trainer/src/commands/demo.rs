@@ -94,7 +94,7 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<(), Failure> 
     };
     let (evaluation, shapes) = evaluate(&input, &|done| console.advance(done as u64, "")).into_diagnostic()?;
 
-    let prepared = Prepared::new(&sequence, &train_shapes, &learned.config, console).into_diagnostic()?;
+    let prepared = Prepared::new(&sequence, &train_shapes, &learned.config, &[], console).into_diagnostic()?;
     let subject = ReportSubject {
         sequence: &sequence,
         prepared: &prepared,

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use sinew_formats::package::save_package;
+use sinew_trainer::components::kept::KeptComponent;
 use sinew_trainer::components::painted::{PaintedRegion, VerticesError};
 use sinew_trainer::config::Recipe;
 use sinew_trainer::learn::{LearnError, RunOptions, learn};
@@ -24,6 +25,7 @@ Examples:
   sinew train walk/ -o walk.sinew --train-every 10 --time-budget 5m
   sinew train flag/ -o flag.sinew --components 6,4,3
   sinew train face/ -o face.sinew --paint left-brow.txt --paint right-brow.txt
+  sinew train face/ -o face2.sinew --components 12,5 --keep face.sinew:c3=smile
   sinew train walk/ -o paper.sinew --train-every 10 --recipe paper --time-budget 1h"
 )]
 pub struct TrainArguments {
@@ -45,6 +47,10 @@ pub struct TrainArguments {
     /// there, and its fine ones below it; may be repeated
     #[arg(long, value_name = "FILE")]
     paint: Vec<PathBuf>,
+    /// Keep a component of an older package of the same mesh as it is, as a coarse one: OLD.sinew:left-brow, or under another name,
+    /// OLD.sinew:c3=left-brow; may be repeated
+    #[arg(long, value_name = "FILE:COMPONENT[=NAME]")]
+    keep: Vec<KeptComponent>,
     /// Way to train; --config changes what its file names
     #[arg(long, value_enum, value_name = "NAME", default_value_t = Recipe::Local)]
     recipe: Recipe,
@@ -98,6 +104,7 @@ pub fn run(arguments: &TrainArguments, console: &Console) -> Result<(), Failure>
     for path in &arguments.paint {
         config.start.painted.push(read_painted(path)?);
     }
+    config.start.kept.extend(arguments.keep.iter().cloned());
     config.check().into_diagnostic()?;
     check_output(&arguments.output)?;
 

@@ -35,7 +35,7 @@ impl<'a> Bench<'a> {
         let mut config = input.settings.config.clone();
         // Only mixes need centres, and no peer mixes.
         config.start.centres = 1;
-        let prepared = Prepared::new(sequence, input.train_shapes, &config, reporter)?;
+        let prepared = Prepared::new(sequence, input.train_shapes, &config, &[], reporter)?;
         let trained = |m: &usize| input.train_shapes.contains(m);
         let test_shapes: Vec<usize> = (1..sequence.shape_count()).filter(|m| !trained(m)).collect();
         if test_shapes.is_empty() {

@@ -311,7 +311,7 @@ impl Run<'_, '_> {
             seed: settings.config.seed,
         };
         let config = tan.config(&settings.config);
-        let prepared = Prepared::new(sequence, train_shapes, &config, self.reporter)?;
+        let prepared = Prepared::new(sequence, train_shapes, &config, &[], self.reporter)?;
         let name = "One-level autoencoder";
         self.begin(name)?;
         self.reporter.stage(name, settings.epochs as u64);

@@ -56,6 +56,8 @@ pub struct LearnedComponent {
     pub minimum: f32,
     /// See [`ComponentRecord`].
     pub maximum: f32,
+    /// The name of a component that is kept from an older package: nothing of it is cut, and it stays.
+    pub kept: Option<String>,
 }
 
 impl LearnedComponent {
@@ -113,6 +115,8 @@ pub struct BasisFrame {
     pub stretch_scale: f32,
     /// Texture coordinates, where the reference has some.
     pub render: Option<RenderSurface>,
+    /// Which of the root block's components are kept from older packages, and their names.
+    pub kept: Vec<(usize, String)>,
 }
 
 impl LearnedBasis {
@@ -142,6 +146,7 @@ impl LearnedBasis {
                     let centre = strongest(&row);
                     let scale = reach.get(level).or(reach.last()).copied().unwrap_or(1.0);
                     let locality = energy_within(&row, &distances(centre), scale);
+                    let kept = frame.kept.iter().find(|(root, _)| component_path == [*root]);
                     components.push(LearnedComponent {
                         path: component_path,
                         row,
@@ -151,6 +156,7 @@ impl LearnedBasis {
                         strength: 0.0,
                         minimum: -1.0,
                         maximum: 1.0,
+                        kept: kept.map(|(_, name)| name.clone()),
                     });
                 }
                 let record = BlockRecord {
@@ -208,6 +214,7 @@ impl LearnedBasis {
         let effect = |component: &LearnedComponent, x: &[f32; 9]| energy(x) * f64::from(component.reach()).powi(2);
         let mut effects: Vec<f64> = self
             .components()
+            .filter(|component| component.kept.is_none())
             .flat_map(|component| component.row.iter().map(move |x| effect(component, x)))
             .filter(|effect| *effect > 0.0)
             .collect();
@@ -216,7 +223,7 @@ impl LearnedBasis {
         }
         let first_kept = effects.len() - budget;
         let (_, &mut least, _) = effects.select_nth_unstable_by(first_kept, f64::total_cmp);
-        for component in self.components_mut() {
+        for component in self.components_mut().filter(|component| component.kept.is_none()) {
             let reach = f64::from(component.reach()).powi(2);
             for x in component.row.iter_mut().filter(|x| energy(x) * reach < least) {
                 *x = [0.0; 9];
@@ -246,7 +253,7 @@ impl LearnedBasis {
             .zip(feature_changes)
             .map(|(component, &change)| {
                 let is_share = attention == Attention::Equal && component.path.len() < level_count;
-                let stays = is_share || change >= settings.least_strength.min(strongest);
+                let stays = is_share || component.kept.is_some() || change >= settings.least_strength.min(strongest);
                 (component.path.clone(), stays)
             })
             .collect();

@@ -59,26 +59,92 @@ fn product(a: &[f64; FEATURE_COUNT], b: &[f64; FEATURE_COUNT]) -> f64 {
     (0..FEATURE_COUNT).map(|c| METRIC[c] * a[c] * b[c]).sum()
 }
 
+/// What a component adds to the features for each unit of its weight, to first order at rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Response {
+    /// Source indices, ascending.
+    pub vertices: Vec<u32>,
+    /// Radians and stretch, in the order of [`Field::values`]. Shape: that of `vertices`.
+    pub values: Vec<[f64; FEATURE_COUNT]>,
+}
+
+/// Responses of all components. Shape: `[K]`. `surface` is that of the package.
+pub fn responses_of(package: &CompactView<'_>, surface: &Surface) -> Vec<Response> {
+    let blocks: Vec<_> = package.blocks().collect();
+    let scales = scales_of(package);
+    let blends = package.components().zip(blends_of(package, surface));
+    blends
+        .map(|(component, blend)| {
+            let bias = blocks[component.block as usize].decoder.bias;
+            let respond = |sum: [f64; FEATURE_COUNT]| {
+                core::array::from_fn(|c| scales[c] * (1.0 - f64::from(bias[c]).tanh().powi(2)) * sum[c])
+            };
+            Response {
+                vertices: blend.vertices,
+                values: blend.sums.into_iter().map(respond).collect(),
+            }
+        })
+        .collect()
+}
+
 /// Plays every component alone at its farther stop, features only: `tanh(bias + stop * (point C + neighbour mean C))` less the
 /// same at 0, in radians and stretch. Shape: `[K]`. `surface` is that of the package.
 pub fn fields_of(package: &CompactView<'_>, surface: &Surface) -> Vec<Field> {
-    let topology = &surface.topology;
     let blocks: Vec<_> = package.blocks().collect();
-    let scales: [f64; FEATURE_COUNT] = core::array::from_fn(|c| {
+    let scales = scales_of(package);
+    let blends = package.components().zip(blends_of(package, surface));
+    blends
+        .map(|(component, blend)| {
+            let block = &blocks[component.block as usize];
+            let stop = if component.maximum >= -component.minimum {
+                component.maximum
+            } else {
+                component.minimum
+            };
+            let play = |sum: [f64; FEATURE_COUNT]| {
+                core::array::from_fn(|c| {
+                    let bias = f64::from(block.decoder.bias[c]);
+                    scales[c] * ((bias + f64::from(stop) * sum[c]).tanh() - bias.tanh())
+                })
+            };
+            Field {
+                level: block.level,
+                stop,
+                vertices: blend.vertices,
+                values: blend.sums.into_iter().map(play).collect(),
+            }
+        })
+        .collect()
+}
+
+/// Radians or stretch of a network unit.
+fn scales_of(package: &CompactView<'_>) -> [f64; FEATURE_COUNT] {
+    core::array::from_fn(|c| {
         f64::from(if c < 3 {
             package.rotation_scale()
         } else {
             package.stretch_scale()
         })
-    });
+    })
+}
+
+/// `point C + neighbour mean C` of one component, where it is not zero.
+struct Blend {
+    /// Ascending.
+    vertices: Vec<u32>,
+    sums: Vec<[f64; FEATURE_COUNT]>,
+}
+
+fn blends_of(package: &CompactView<'_>, surface: &Surface) -> Vec<Blend> {
+    let topology = &surface.topology;
+    let blocks: Vec<_> = package.blocks().collect();
     let mut sums = vec![[0.0; FEATURE_COUNT]; topology.vertex_count];
     let mut touched = vec![false; topology.vertex_count];
     package
         .components()
         .zip(unpack_components(package))
         .map(|(component, sparse)| {
-            let block = &blocks[component.block as usize];
-            let decoder = &block.decoder;
+            let decoder = &blocks[component.block as usize].decoder;
             let mut vertices = Vec::with_capacity(sparse.vertices.len());
             let mut add =
                 |v: u32, matrix: &[[f32; FEATURE_COUNT]; FEATURE_COUNT], x: &[f32; FEATURE_COUNT], share: f64| {
@@ -102,28 +168,12 @@ pub fn fields_of(package: &CompactView<'_>, surface: &Surface) -> Vec<Field> {
                 }
             }
             vertices.sort_unstable();
-            let stop = if component.maximum >= -component.minimum {
-                component.maximum
-            } else {
-                component.minimum
+            let take = |&v: &u32| {
+                touched[v as usize] = false;
+                core::mem::take(&mut sums[v as usize])
             };
-            let values = vertices
-                .iter()
-                .map(|&v| {
-                    touched[v as usize] = false;
-                    let sum = core::mem::take(&mut sums[v as usize]);
-                    core::array::from_fn(|c| {
-                        let bias = f64::from(decoder.bias[c]);
-                        scales[c] * ((bias + f64::from(stop) * sum[c]).tanh() - bias.tanh())
-                    })
-                })
-                .collect();
-            Field {
-                level: block.level,
-                stop,
-                vertices,
-                values,
-            }
+            let sums = vertices.iter().map(take).collect();
+            Blend { vertices, sums }
         })
         .collect()
 }

@@ -5,6 +5,7 @@
 pub mod anatomy;
 pub mod extract;
 pub mod fields;
+pub mod kept;
 pub mod labels;
 pub mod mix;
 pub mod modes;

@@ -35,7 +35,7 @@ pub struct VerticesError {
 }
 
 /// Most bytes of a region's name: those of a component less what the deepest child adds.
-const NAME_LENGTH: usize = 40;
+pub(super) const NAME_LENGTH: usize = 40;
 
 /// Why painted regions cannot be used.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -174,7 +174,7 @@ pub fn painted_labels(
     let mut labels: Vec<Option<u32>> = vec![None; vertex_count];
     for (r, region) in regions.iter().enumerate() {
         let name = &region.name;
-        if !is_name(name) || is_place(name) || name.len() > NAME_LENGTH || name.contains('.') {
+        if !is_region_name(name) {
             return Err(PaintError::Name(name.clone()));
         }
         if regions[..r].iter().any(|other| other.name == *name) {
@@ -203,9 +203,21 @@ pub fn painted_labels(
     Ok(labels)
 }
 
-/// How many regions the labels of [`painted_labels`] name.
-pub fn region_count(labels: &[Option<u32>]) -> usize {
-    labels.iter().flatten().max().map_or(0, |&most| most as usize + 1)
+/// Whether a coarse component, and with a number behind a dot what lies below it, can be called so.
+pub(super) fn is_region_name(name: &str) -> bool {
+    is_name(name) && !is_place(name) && name.len() <= NAME_LENGTH && !name.contains('.')
+}
+
+/// Pairs for [`super::rename::new_names`]: the component at place number `root` is called `name`, and those below it `name.0` and so on.
+/// `places`: those of all components.
+pub fn with_those_below(places: &[String], root: usize, name: &str) -> Vec<(String, String)> {
+    let below = format!("{}.", places[root]);
+    let own = (places[root].clone(), name.to_owned());
+    let others = places.iter().filter_map(|place| {
+        let rest = place.strip_prefix(&below)?;
+        Some((place.clone(), format!("{name}.{rest}")))
+    });
+    core::iter::once(own).chain(others).collect()
 }
 
 /// Places and new names of the coarse component that lives on each painted region alone, `ear`, and of what lies below it,
@@ -234,12 +246,7 @@ pub fn painted_names(view: &CompactView<'_>, regions: &[PaintedRegion]) -> Vec<(
         let Some(&root) = living.max_by_key(|&&k| (moved[k], core::cmp::Reverse(k))) else {
             continue;
         };
-        names.push((places[root].clone(), region.name.clone()));
-        let below = format!("{}.", places[root]);
-        names.extend(places.iter().filter_map(|place| {
-            let rest = place.strip_prefix(&below)?;
-            Some((place.clone(), format!("{}.{rest}", region.name)))
-        }));
+        names.extend(with_those_below(&places, root, &region.name));
     }
     names
 }

@@ -8,7 +8,6 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::modes::{WeightedSamples, columns};
-use super::painted::region_count;
 use crate::mesh::topology::Topology;
 
 /// How strongly the first clustering weighs where a vertex is against how it turns.
@@ -24,35 +23,44 @@ const SMOOTHING_STEPS: f64 = 20.0;
 /// See [`SMOOTHING_STEPS`].
 const SMOOTHING_VERTICES: f64 = 1504.0;
 
+/// Vertices that belong to a region from the outset.
+#[derive(Debug, Clone, Default)]
+pub struct Claims {
+    /// The region of a vertex, below `count`. Shape: `[V]`.
+    pub labels: Vec<Option<u32>>,
+    /// Regions that were claimed, fewer than there are to be; one may have lost all its vertices to others.
+    pub count: usize,
+}
+
 /// Splits the mesh into `count` regions. Shape: `samples` is flat `[S][V][9]` in network units; the result is `[V]`, each
-/// below `count`. `rounds` k-subspace rounds follow the first clustering. What `painted` names keeps its label, and no other
-/// vertex takes that. Shape: `[V]`, labels from 0 without a gap, fewer than `count` of them.
+/// below `count`. `rounds` k-subspace rounds follow the first clustering. What `claims` names keeps its label, and no other
+/// vertex takes that.
 pub fn find_regions(
     topology: &Topology,
     rest: &[[f64; 3]],
     samples: &[f32],
-    painted: &[Option<u32>],
+    claims: &Claims,
     count: usize,
     rounds: usize,
     seed: u64,
 ) -> Vec<u32> {
-    let painted_count = region_count(painted);
+    let (claimed, claimed_count) = (&claims.labels, claims.count);
     let points = descriptors(rest, samples);
-    let free: Vec<usize> = (0..points.len()).filter(|&v| painted[v].is_none()).collect();
-    let mut labels: Vec<u32> = painted.iter().map(|label| label.unwrap_or(0)).collect();
+    let free: Vec<usize> = (0..points.len()).filter(|&v| claimed[v].is_none()).collect();
+    let mut labels: Vec<u32> = claimed.iter().map(|label| label.unwrap_or(0)).collect();
     if !free.is_empty() {
         let free_points: Vec<Vec<f32>> = free.iter().map(|&v| points[v].clone()).collect();
-        let found = cluster(&free_points, count - painted_count, seed);
+        let found = cluster(&free_points, count - claimed_count, seed);
         for (&v, label) in free.iter().zip(found) {
-            labels[v] = label + painted_count as u32;
+            labels[v] = label + claimed_count as u32;
         }
     }
     let keep = |own: &[u32], next: Vec<u32>| -> Vec<u32> {
-        let pairs = own.iter().zip(next).zip(painted);
+        let pairs = own.iter().zip(next).zip(claimed);
         pairs
-            .map(|((&own, next), painted)| match painted {
+            .map(|((&own, next), claimed)| match claimed {
                 Some(label) => *label,
-                None if (next as usize) < painted_count => own,
+                None if (next as usize) < claimed_count => own,
                 None => next,
             })
             .collect()

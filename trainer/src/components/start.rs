@@ -6,8 +6,7 @@ use faer::{Mat, Side};
 use rayon::prelude::*;
 
 use super::modes::WeightedSamples;
-use super::painted::region_count;
-use super::regions::{find_regions, soft_windows};
+use super::regions::{Claims, find_regions, soft_windows};
 use crate::mesh::topology::Topology;
 use crate::network::attention::Attention;
 use crate::network::weights::{BlockWeights, LevelWeights, StackWeights, zero_convolution};
@@ -26,8 +25,10 @@ pub struct StartInput<'a> {
     pub rest: &'a [[f64; 3]],
     /// Mixes in network units. Shape: flat `[S][V][9]`.
     pub samples: &'a [f32],
-    /// The painted region of a vertex, each the place of one root component. Shape: `[V]`, fewer labels than root components.
-    pub painted: &'a [Option<u32>],
+    /// Which vertices belong to painted regions and kept components, each the place of one root component.
+    pub claims: &'a Claims,
+    /// Rows of the kept components, the last of those claims: they stay as they are. Shape: flat `[V][9]` each.
+    pub kept: &'a [Vec<f32>],
     /// K of each level, coarse to fine; none is 0.
     pub component_counts: &'a [usize],
     /// How residuals are shared out among the blocks below.
@@ -48,22 +49,26 @@ pub fn closed_form_start(input: &StartInput<'_>, distances: &(dyn Fn(usize) -> V
         input.topology,
         input.rest,
         input.samples,
-        input.painted,
+        input.claims,
         root_count,
         input.rounds,
         input.seed,
     );
     let mut windows = soft_windows(input.topology, &labels, root_count);
-    let painted_count = region_count(input.painted);
+    let labels = &input.claims.labels;
+    let painted_count = input.claims.count - input.kept.len();
     for (region, window) in windows.iter_mut().enumerate().take(painted_count) {
         let outside = |label: &Option<u32>| *label != Some(region as u32);
-        let places = window.iter_mut().zip(input.painted);
+        let places = window.iter_mut().zip(labels);
         places.filter(|(_, label)| outside(label)).for_each(|(w, _)| *w = 0.0);
     }
     let mut rows: Vec<Vec<f32>> = windows
         .par_iter()
         .enumerate()
         .map(|(region, window)| {
+            if (painted_count..input.claims.count).contains(&region) {
+                return vec![0.0; vertex_count * 9];
+            }
             let mut row = windowed_modes(input.samples, vertex_count, window, 1).remove(0);
             // A painted region reaches as far as it is painted.
             if region < painted_count {
@@ -81,11 +86,12 @@ pub fn closed_form_start(input: &StartInput<'_>, distances: &(dyn Fn(usize) -> V
         .collect();
     orthonormalise(&mut rows);
     for (region, row) in rows.iter_mut().enumerate().take(painted_count) {
-        let places = row.chunks_exact_mut(9).zip(input.painted);
+        let places = row.chunks_exact_mut(9).zip(labels);
         places
             .filter(|(_, label)| **label != Some(region as u32))
             .for_each(|(x, _)| x.fill(0.0));
     }
+    rows[painted_count..input.claims.count].clone_from_slice(input.kept);
 
     let mut levels = vec![LevelWeights {
         component_count: root_count,

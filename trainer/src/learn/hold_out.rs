@@ -5,12 +5,12 @@ use rayon::prelude::*;
 use sinew_runtime::Basis;
 
 use super::LearnError;
-use super::package::{PackageError, draft, with_players};
+use super::package::{PackageError, draft, encode_linearly, with_players};
 use super::prepare::Prepared;
 use crate::bake::{Surface, bake};
 use crate::components::extract::LearnedBasis;
 use crate::config::{TrainConfig, ValidationSettings};
-use crate::evaluate::{EncoderSettings, NormalisedPair, StackEncoder};
+use crate::evaluate::{NormalisedPair, StackEncoder};
 use crate::network::weights::StackWeights;
 use crate::training::fit::HistoryPoint;
 
@@ -49,20 +49,22 @@ impl HeldOut {
         (0..shape_count).filter(|m| !self.shapes.contains(m)).collect()
     }
 
-    /// E_rms of the held-out shapes through encoder, decode and solve: what a user of the package would see.
+    /// E_rms of the held-out shapes by [`encoder_error`].
     pub fn error(&self, prepared: &Prepared, config: &TrainConfig, weights: &StackWeights) -> Result<f32, LearnError> {
         let basis = draft(prepared, config, weights, &self.rest_of(prepared.network.len()))?;
         let inputs: Vec<&[[f32; 9]]> = self.shapes.iter().map(|&m| &prepared.network[m]).collect();
         let truth = self.shapes.iter().map(|&m| prepared.aligned[m].to_vec()).collect();
-        Ok(encoder_error(&basis, config.encoder(), &inputs, Some(truth))?)
+        Ok(encoder_error(&basis, prepared, config, &inputs, Some(truth))?)
     }
 }
 
 /// E_rms of `inputs` (network units) through encoder, decode and solve, against `truth`, or against the inputs' own
-/// positions by the solve alone.
+/// positions by the solve alone. Components that will be refined serve whatever finds their weights by least squares, so
+/// the linear encoder judges them; others are judged by the network's own.
 pub fn encoder_error(
     basis: &LearnedBasis,
-    settings: EncoderSettings,
+    prepared: &Prepared,
+    config: &TrainConfig,
     inputs: &[&[[f32; 9]]],
     truth: Option<Vec<Vec<[f32; 3]>>>,
 ) -> Result<f32, PackageError> {
@@ -70,9 +72,13 @@ pub fn encoder_error(
     let view = compact.view()?;
     let baked = bake(&view)?;
     let opened = Basis::open(&baked)?;
-    let surface = Surface::of_package(&view);
-    let encoder = StackEncoder::new(&view, &surface.topology, settings);
-    let codes: Vec<Vec<f64>> = inputs.par_iter().map(|shape| encoder.encode(shape).weights).collect();
+    let codes: Vec<Vec<f64>> = if config.refine.rounds > 0 {
+        encode_linearly(basis, prepared, inputs)?
+    } else {
+        let surface = Surface::of_package(&view);
+        let encoder = StackEncoder::new(&view, &surface.topology, config.encoder());
+        inputs.par_iter().map(|shape| encoder.encode(shape).weights).collect()
+    };
     let played = with_players(&opened, &codes, |player, code| Ok(player.play(code)?.to_vec()))?;
     let truth = match truth {
         Some(truth) => truth,

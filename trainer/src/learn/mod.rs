@@ -21,11 +21,13 @@ use sinew_formats::interchange::MeshSequence;
 use sinew_formats::package::{AlignedBytes, CompactView, Quality, WriteError};
 
 use crate::bake::BakeError;
+use crate::components::kept::{self, KeepError, row_behind};
 use crate::components::painted::{PaintError, painted_labels};
 use crate::components::position_modes::{keep_linear_algebra_serial, position_modes};
 use crate::config::{StartKind, TrainConfig};
 use crate::evaluate::PlayError;
 use crate::mesh::sparse_factor::FactorError;
+use crate::network::weights::StackWeights;
 use crate::training::fit::{FitOutcome, HistoryPoint, TrainingError};
 use hold_out::HeldOut;
 use package::PackageError;
@@ -125,6 +127,9 @@ pub enum LearnError {
     /// A painted region does not fit the mesh or the components.
     #[error(transparent)]
     Paint(#[from] PaintError),
+    /// A component of an older package cannot be kept.
+    #[error(transparent)]
+    Keep(#[from] KeepError),
     /// Features go to a file where they are many, and there is no room for it.
     #[error(
         "the features of the training shapes cannot be kept in {}: {source}; make room there, or name another folder in TMPDIR",
@@ -181,9 +186,18 @@ pub fn learn(
     if config.start.kind == StartKind::Random && !config.start.painted.is_empty() {
         return Err(PaintError::RandomStart.into());
     }
+    if config.start.kind == StartKind::Random && !config.start.kept.is_empty() {
+        return Err(KeepError::RandomStart.into());
+    }
+    let kept = kept::read(
+        &config.start.kept,
+        &config.start.painted,
+        config.components[0],
+        sequence,
+    )?;
     let reviewed = review(sequence, train_shapes, config.component_count())?;
     reviewed.notices.iter().for_each(|notice| reporter.notice(notice));
-    let prepared = Prepared::new(sequence, &reviewed.shapes, config, reporter)?;
+    let prepared = Prepared::new(sequence, &reviewed.shapes, config, &kept, reporter)?;
     let mut folder = RunFolder::open(options.work_folder.as_deref(), &prepared.fingerprint(config))?;
     let held_out = HeldOut::choose(&prepared, &config.validation);
     let fit_shapes = held_out.rest_of(prepared.network.len());
@@ -299,7 +313,9 @@ fn finish(
     reporter: &dyn Reporter,
 ) -> Result<Learned, LearnError> {
     let all: Vec<usize> = (0..prepared.network.len()).collect();
-    let weights = refine::refine(prepared, config, &all, outcome.weights, reporter)?;
+    let mut weights = outcome.weights;
+    restore_kept(prepared, &mut weights);
+    let weights = refine::refine(prepared, config, &all, weights, reporter)?;
     reporter.stage("packaging", 1);
     let quality = Quality {
         validation_e_rms: outcome.best_validation.filter(|e| e.is_finite()).unwrap_or(-1.0),
@@ -335,4 +351,15 @@ fn finish(
         steps_run: quality.steps_run as usize,
         stop_reason: in_words(outcome.stop_reason).to_owned(),
     })
+}
+
+/// What was kept decodes again to what it was: during the fit its row stayed, but not the convolution behind it. Refinement leaves
+/// both alone.
+fn restore_kept(prepared: &Prepared, weights: &mut StackWeights) {
+    let root = &mut weights.levels[0].blocks[0];
+    for (k, wanted) in prepared.kept_roots().zip(&prepared.kept_rows) {
+        if let Some(row) = row_behind(wanted, &root.decoder, &prepared.topology) {
+            root.components[k * row.len()..(k + 1) * row.len()].copy_from_slice(&row);
+        }
+    }
 }

@@ -11,8 +11,8 @@ use super::prepare::Prepared;
 use super::stages::mixer;
 use crate::bake::{BakeError, Surface, bake};
 use crate::components::extract::LearnedBasis;
-use crate::components::painted::painted_names;
-use crate::components::rename::{RenameError, new_names, renamed};
+use crate::components::painted::{painted_names, with_those_below};
+use crate::components::rename::{RenameError, new_names, places, renamed};
 use crate::config::TrainConfig;
 use crate::evaluate::{FeatureDecoder, FeatureMetric, FeatureProjection, PlayError, Player, ScoreError, StackEncoder};
 use crate::network::weights::StackWeights;
@@ -28,7 +28,7 @@ pub enum PackageError {
     #[error("the package cannot be baked: {0}")]
     Bake(#[from] BakeError),
     /// Its components cannot be named.
-    #[error("the components of painted regions cannot be named: {0}")]
+    #[error("painted and kept components cannot be named: {0}")]
     Name(#[from] RenameError),
     /// What was just written does not open.
     #[error("the package does not open: {0}")]
@@ -140,7 +140,13 @@ pub fn package(
     };
     let bytes = basis.with_records(provenance, quality, write_compact)?;
     let view = CompactView::open(&bytes)?;
-    let names = painted_names(&view, &config.start.painted);
+    let mut names = painted_names(&view, &config.start.painted);
+    let places = places(&view);
+    for (root, component) in basis.components().enumerate() {
+        if let Some(name) = &component.kept {
+            names.extend(with_those_below(&places, root, name));
+        }
+    }
     let bytes = if names.is_empty() {
         bytes
     } else {
@@ -193,15 +199,34 @@ pub(super) fn project(
     prepared: &Prepared,
     shapes: &[&[[f32; 9]]],
 ) -> Result<(FeatureDecoder, Vec<Vec<f64>>), PackageError> {
+    with_projection(basis, prepared, shapes, |projection, shape| {
+        projection.weights(shape, vec![0.0; basis.components().count()])
+    })
+}
+
+/// The same by the linear encoder: the projection's first step, quick enough to judge by while training goes on.
+pub(super) fn encode_linearly(
+    basis: &LearnedBasis,
+    prepared: &Prepared,
+    shapes: &[&[[f32; 9]]],
+) -> Result<Vec<Vec<f64>>, PackageError> {
+    let encode = |projection: &FeatureProjection<'_>, shape: &[[f32; 9]]| projection.linear_weights(shape);
+    Ok(with_projection(basis, prepared, shapes, encode)?.1)
+}
+
+fn with_projection(
+    basis: &LearnedBasis,
+    prepared: &Prepared,
+    shapes: &[&[[f32; 9]]],
+    weights: impl Fn(&FeatureProjection<'_>, &[[f32; 9]]) -> Vec<f64> + Sync,
+) -> Result<(FeatureDecoder, Vec<Vec<f64>>), PackageError> {
     let compact = basis.write_draft()?;
     let baked = bake(&compact.view()?)?;
     let decoder = FeatureDecoder::new(&BakedView::open(&baked)?);
     let areas: Vec<f64> = prepared.areas.iter().map(|&area| f64::from(area)).collect();
     let metric = FeatureMetric::new(&prepared.system, prepared.scaler.scales(), &areas);
     let projection = FeatureProjection::new(&decoder, metric);
-    let start = vec![0.0; decoder.component_count()];
-    let codes = shapes.par_iter().map(|shape| projection.weights(shape, start.clone()));
-    let codes = codes.collect();
+    let codes = shapes.par_iter().map(|shape| weights(&projection, shape)).collect();
     drop(projection);
     Ok((decoder, codes))
 }

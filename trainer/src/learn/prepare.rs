@@ -9,6 +9,9 @@ use sinew_formats::interchange::{MeshSequence, RenderSurface};
 
 use super::{LearnError, Reporter};
 use crate::components::extract::BasisFrame;
+use crate::components::kept::{KeptResponse, claim, network_row};
+use crate::components::painted::painted_labels;
+use crate::components::regions::Claims;
 use crate::config::TrainConfig;
 use crate::features::acap::features_of_shape;
 use crate::features::align::{RigidMotion, widened};
@@ -45,17 +48,23 @@ pub struct Prepared {
     pub aligned: ShapeStore<3>,
     /// Distances from the centres that mixes choose from, longest 1. Shape: `[centres][V]`.
     pub centre_distances: Vec<Vec<f32>>,
+    /// Which vertices belong to painted regions and kept components.
+    pub claims: Claims,
+    /// Rows of the kept components in network units, of unit length, the last of `claims`. Shape: `[kept][V * 9]`.
+    pub kept_rows: Vec<Vec<f32>>,
+    kept_names: Vec<String>,
     heat: HeatMethod,
     cache: Mutex<BTreeMap<usize, Arc<Vec<f32>>>>,
 }
 
 impl Prepared {
-    /// Reads features off the training shapes.
+    /// Reads features off the training shapes. `kept`: what [`crate::components::kept::read`] found.
     /// Errors: fewer than one shape besides the reference, shapes that do not move, a mesh that cannot be factored.
     pub fn new(
         sequence: &MeshSequence,
         train_shapes: &[usize],
         config: &TrainConfig,
+        kept: &[KeptResponse],
         reporter: &dyn Reporter,
     ) -> Result<Self, LearnError> {
         let shapes: Vec<usize> = train_shapes
@@ -87,6 +96,15 @@ impl Prepared {
             .0
             .par_iter_mut()
             .for_each(|value| *value = core::array::from_fn(|c| (f64::from(value[c]) / scales[c]) as f32));
+        let painted = &config.start.painted;
+        let mut labels = painted_labels(painted, rest.len(), config.components[0])?;
+        let rows = kept.iter().map(|kept| network_row(&kept.response, &scaler, rest.len()));
+        let kept_rows: Vec<Vec<f32>> = rows.collect();
+        claim(&mut labels, &kept_rows, painted.len());
+        let claims = Claims {
+            labels,
+            count: painted.len() + kept.len(),
+        };
         let anchor = choose_anchor(&rest, aligned.iter().map(widened));
         let system = PoissonSystem::new(&topology, &weights, &rest, anchor)?;
         let areas = topology.vertex_areas(&rest).into_iter().map(|a| a as f32).collect();
@@ -114,6 +132,9 @@ impl Prepared {
             scaler,
             network: Arc::new(network),
             centre_distances,
+            claims,
+            kept_rows,
+            kept_names: kept.iter().map(|kept| kept.name.clone()).collect(),
             heat,
             cache: Mutex::new(BTreeMap::new()),
         })
@@ -154,7 +175,13 @@ impl Prepared {
             rotation_scale: self.scaler.rotation_scale,
             stretch_scale: self.scaler.stretch_scale,
             render: self.render.clone(),
+            kept: self.kept_roots().zip(self.kept_names.iter().cloned()).collect(),
         }
+    }
+
+    /// Numbers of the root components that are kept.
+    pub fn kept_roots(&self) -> core::ops::Range<usize> {
+        self.claims.count - self.kept_rows.len()..self.claims.count
     }
 
     /// A number that tells runs on other data or settings apart.
@@ -164,6 +191,9 @@ impl Prepared {
         digest.update(config.to_toml().as_bytes());
         digest.update(bytemuck::cast_slice(&self.rest_positions));
         digest.update(bytemuck::cast_slice(&self.topology.faces));
+        for row in &self.kept_rows {
+            digest.update(bytemuck::cast_slice(row));
+        }
         for shape in self.network.iter() {
             digest.update(bytemuck::cast_slice(shape));
         }

@@ -5,6 +5,8 @@
 //! solve itself says which weights suit each mix, and every vertex then answers to the few components that reach it, by
 //! least squares of its own. Supports stay as they are.
 
+use core::ops::Range;
+
 use nalgebra::{Cholesky, DMatrix, SMatrix};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -96,13 +98,19 @@ fn turn(
                 .collect()
         })
         .collect();
-    correct(weights, &codes, &residuals);
+    correct(weights, &codes, &residuals, prepared.kept_roots());
     weights.normalize_rows();
     Ok(())
 }
 
-/// Adds to every component, where it is not zero, what explains most of the residuals at its weights.
-fn correct(weights: &mut StackWeights, codes: &[Vec<f64>], residuals: &[Vec<[f32; FEATURE_COUNT]>]) {
+/// Adds to every component, where it is not zero, what explains most of the residuals at its weights; those of the root block
+/// that are `kept` stay.
+fn correct(
+    weights: &mut StackWeights,
+    codes: &[Vec<f64>],
+    residuals: &[Vec<[f32; FEATURE_COUNT]>],
+    kept: Range<usize>,
+) {
     let vertex_count = weights.vertex_count;
     let component_count = codes.first().map_or(0, Vec::len);
     let mut gram = DMatrix::from_fn(component_count, component_count, |i, j| {
@@ -127,7 +135,7 @@ fn correct(weights: &mut StackWeights, codes: &[Vec<f64>], residuals: &[Vec<[f32
         .map(|v| {
             let at = FEATURE_COUNT * v..FEATURE_COUNT * (v + 1);
             let reaching: Vec<usize> = (0..rows.len())
-                .filter(|&k| undo[k].is_some() && rows[k][at.clone()].iter().any(|&x| x != 0.0))
+                .filter(|&k| !kept.contains(&k) && undo[k].is_some() && rows[k][at.clone()].iter().any(|&x| x != 0.0))
                 .collect();
             correct_vertex(v, &reaching, &gram, codes, residuals, &undo)
         })
@@ -238,7 +246,7 @@ mod tests {
                     .collect()
             })
             .collect();
-        correct(&mut weights, &codes, &residuals);
+        correct(&mut weights, &codes, &residuals, 0..0);
         let after = weights.flat_components();
         for k in 0..2 {
             for v in 0..vertex_count {

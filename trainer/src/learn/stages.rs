@@ -9,7 +9,6 @@ use super::prepare::Prepared;
 use super::run_folder::{Plan, RunFolder};
 use super::{LearnError, Reporter, package};
 use crate::components::mix::{MixSettings, Mixer};
-use crate::components::painted::painted_labels;
 use crate::components::random_start::random_start;
 use crate::components::start::{StartInput, closed_form_start};
 use crate::config::{StartKind, TrainConfig};
@@ -75,7 +74,7 @@ fn start(
             return Ok(weights);
         }
         let basis = package::draft(prepared, config, &weights, shapes)?;
-        let error = encoder_error(&basis, config.encoder(), &unseen, None)?;
+        let error = encoder_error(&basis, prepared, config, &unseen, None)?;
         if best.as_ref().is_none_or(|(least, _)| error < *least) {
             best = Some((error, weights));
         }
@@ -91,13 +90,13 @@ fn start_of_seed(
     mixes: &MixSettings,
     seed: u64,
 ) -> Result<StackWeights, LearnError> {
-    let painted = painted_labels(&config.start.painted, prepared.rest.len(), config.components[0])?;
     let samples = mixer(prepared, shapes, mixes, seed).mixes(START_MIXES, config.start.samples);
     let input = StartInput {
         topology: &prepared.topology,
         rest: &prepared.rest,
         samples: &samples,
-        painted: &painted,
+        claims: &prepared.claims,
+        kept: &prepared.kept_rows,
         component_counts: &config.components,
         attention: config.fit.attention,
         // What mixes move as one is not cut into pieces.
@@ -200,6 +199,7 @@ pub(super) fn run_fit(
         topology: &prepared.topology,
         vertex_weights: &prepared.areas,
         position_modes: modes,
+        kept_roots: prepared.kept_roots(),
         distances: &distances,
     };
     let settings = FitSettings {

@@ -57,6 +57,7 @@ pub fn fit(
 ) -> Result<FitOutcome, TrainingError> {
     check(input, &start, settings)?;
     let supports = supports_of(&start);
+    let kept_rows = start.levels[0].blocks[0].components.clone();
     let identity = checkpoint::identity(input, settings, &start);
     let resumed = match checkpoints {
         Some(path) if path.exists() => Some(checkpoint::read(path, identity, &start)?),
@@ -67,11 +68,15 @@ pub fn fit(
         None => (first_state(start, settings, validate), Stepper::new()),
     };
     let supports = settings.keep_supports.then_some(supports);
+    let row_len = state.weights.vertex_count * FEATURE_COUNT;
+    let kept = input.kept_roots.start * row_len..input.kept_roots.end * row_len;
+    let kept = (kept.start, kept_rows[kept].to_vec());
     let first_step = state.step;
     let mut run = Run {
         network: Network::new(settings.engine, settings.attention, input),
         regions: SparsityRegions::new(input.distances),
         supports,
+        kept,
         settings,
         rate: settings
             .rate
@@ -151,6 +156,11 @@ fn check(input: &FitInput<'_>, start: &StackWeights, settings: &FitSettings) -> 
         ("the start's C row", start.vertex_count * FEATURE_COUNT, shape_len),
         ("the list of vertex weights", input.vertex_weights.len(), vertex_count),
         (
+            "the kept rows of the root block",
+            input.kept_roots.end.min(start.levels[0].component_count),
+            input.kept_roots.end,
+        ),
+        (
             "the list of position modes",
             input.position_modes.len(),
             input.position_modes.len() / shape_len * shape_len,
@@ -225,6 +235,8 @@ struct Run<'a> {
     regions: SparsityRegions<'a>,
     /// Where components may differ from zero, in the order of blocks, then `[K][V]`; everywhere where absent.
     supports: Option<Vec<bool>>,
+    /// Where the rows that stay begin in the root block's C, and what they are.
+    kept: (usize, Vec<f32>),
     settings: &'a FitSettings,
     rate: f32,
     state: FitState,
@@ -339,6 +351,8 @@ impl Run<'_> {
             if settings.loss.unit_rows {
                 state.weights.normalize_rows();
             }
+            let (at, kept) = &self.kept;
+            state.weights.levels[0].blocks[0].components[*at..at + kept.len()].copy_from_slice(kept);
             sound = state.weights.is_finite();
         }
         state.step += 1;

@@ -1,5 +1,7 @@
 //! What a fit is given and what it answers: settings, the mesh, progress, outcome, errors.
 
+use core::ops::Range;
+
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -89,6 +91,8 @@ pub struct FitInput<'a> {
     pub vertex_weights: &'a [f32],
     /// The g_i of the position term; empty for none. Shape: `[I][V][9]`.
     pub position_modes: &'a [f32],
+    /// Components of the root block that stay as the start has them.
+    pub kept_roots: Range<usize>,
     /// Geodesic distances from a vertex as a share of the mesh's largest, shape `[V]`; asked for at most once a vertex.
     pub distances: &'a (dyn Fn(usize) -> Vec<f32> + Sync),
 }

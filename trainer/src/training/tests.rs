@@ -96,6 +96,7 @@ fn train(
         topology: &topology,
         vertex_weights: &[1.0; VERTEX_COUNT],
         position_modes: &mode,
+        kept_roots: 0..0,
         distances: &|centre| {
             (0..VERTEX_COUNT)
                 .map(|v| v.abs_diff(centre) as f32 / VERTEX_COUNT as f32)

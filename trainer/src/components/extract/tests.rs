@@ -31,6 +31,7 @@ fn block(path: &[usize], strengths: &[f32]) -> LearnedBlock {
                 strength,
                 minimum: -1.0,
                 maximum: 1.0,
+                kept: None,
             })
             .collect(),
     }
