@@ -224,7 +224,7 @@ impl Default for ValidationSettings {
             share: 0.2,
             shapes_min: 8,
             shapes_max: 6,
-            mix_candidates: vec![(0.14, 6, 20), (0.2, 4, 8), (0.4, 2, 4)],
+            mix_candidates: vec![(0.14, 6, 20), (0.2, 4, 8), (0.4, 2, 4), (0.8, 1, 3)],
             start_seeds: 3,
             refit_shapes_max: 16,
         }
