@@ -106,6 +106,8 @@ pub struct Figures {
     pub components: usize,
     /// Weights by the network's encoder.
     pub encoder: Scores,
+    /// Weights by the linear encoder.
+    pub linear_encoder: Scores,
     /// Weights by least squares in features.
     pub feature_projection: Scores,
     /// Weights by Gauss-Newton on positions.
@@ -115,6 +117,10 @@ pub struct Figures {
     pub missed_training: f64,
     /// The same for the measured shapes.
     pub missed_unseen: f64,
+    /// What the linear encoder misses of the worst training shape.
+    pub missed_training_linear: f64,
+    /// The same for the measured shapes.
+    pub missed_unseen_linear: f64,
     /// Steps of the optimiser.
     pub steps: usize,
     /// Why training ended.
@@ -241,27 +247,31 @@ fn measure(
     let training_seconds = begun.elapsed().as_secs_f64();
     let trained: Vec<usize> = input.train_shapes.iter().copied().filter(|&m| m != 0).collect();
     reporter.stage("measuring", (input.test_shapes.len() + trained.len()) as u64);
-    let on = |test_shapes: &[usize], before: usize| {
-        let input = EvaluationInput {
-            package: &learned.package,
-            sequence: input.sequence,
-            test_shapes,
-            trained_shapes: &[],
-            settings: config.features,
-            encoder: config.encoder(),
-        };
-        evaluate(&input, &|done| reporter.advance((before + done) as u64, ""))
+    let input = EvaluationInput {
+        package: &learned.package,
+        sequence: input.sequence,
+        test_shapes: input.test_shapes,
+        trained_shapes: &trained,
+        settings: config.features,
+        encoder: config.encoder(),
     };
-    let (unseen, _) = on(input.test_shapes, 0)?;
-    let (seen, _) = on(&trained, input.test_shapes.len())?;
+    let (unseen, _) = evaluate(&input, &|done| reporter.advance(done as u64, ""))?;
+    let missed = &unseen.max_percentage_error;
+    let seen = unseen
+        .trained_max_percentage_error
+        .as_ref()
+        .expect("a training has a shape besides the reference");
     Ok(Figures {
         components_asked: config.component_count(),
         components: learned.component_count,
         encoder: unseen.encoder,
+        linear_encoder: unseen.linear_encoder,
         feature_projection: unseen.feature_projection,
         position_projection: unseen.position_projection,
-        missed_training: seen.max_percentage_error.two_level,
-        missed_unseen: unseen.max_percentage_error.two_level,
+        missed_training: seen.two_level,
+        missed_unseen: missed.two_level,
+        missed_training_linear: seen.linear,
+        missed_unseen_linear: missed.linear,
         steps: learned.steps_run,
         stop_reason: learned.stop_reason,
         training_seconds,

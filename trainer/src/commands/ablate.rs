@@ -155,10 +155,11 @@ fn print_tables(ablation: &Ablation) {
         }
         println!();
         println!(
-            "{:<34} {:>7} {:>16} {:>16} {:>16} {:>8} {:>8} {:>6} {:>7}",
+            "{:<34} {:>7} {:>16} {:>16} {:>16} {:>16} {:>15} {:>15} {:>6} {:>7}",
             group.title(),
             "K",
             "encoder",
+            "linear",
             "features",
             "positions",
             "trained",
@@ -172,12 +173,22 @@ fn print_tables(ablation: &Ablation) {
                 Outcome::Failed(why) => println!("{name:<34} failed: {why}"),
                 Outcome::Measured(f) => {
                     print!("{name:<34} {:>7}", format!("{}/{}", f.components, f.components_asked));
-                    for scores in [&f.encoder, &f.feature_projection, &f.position_projection] {
+                    for scores in [
+                        &f.encoder,
+                        &f.linear_encoder,
+                        &f.feature_projection,
+                        &f.position_projection,
+                    ] {
                         print!(" {:>8.3} {:>7.4}", scores.e_rms, scores.sted);
                     }
                     println!(
-                        " {:>8.4} {:>8.4} {:>6} {:>7.1}",
-                        f.missed_training, f.missed_unseen, f.steps, f.training_seconds
+                        " {:>7.4} {:>7.4} {:>7.4} {:>7.4} {:>6} {:>7.1}",
+                        f.missed_training,
+                        f.missed_training_linear,
+                        f.missed_unseen,
+                        f.missed_unseen_linear,
+                        f.steps,
+                        f.training_seconds
                     );
                 }
             }
@@ -187,5 +198,8 @@ fn print_tables(ablation: &Ablation) {
     println!(
         "* what the others change one choice of. Pairs: E_rms and STED of unseen shapes. K: components kept of those asked for."
     );
-    println!("trained, unseen: max-percentage error, the share of feature energy the encoder misses, worst shape");
+    println!(
+        "trained, unseen: max-percentage error, the share of feature energy that the network's encoder misses, then the linear one, of the \
+         worst shape"
+    );
 }

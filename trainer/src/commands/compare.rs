@@ -1,6 +1,6 @@
 //! `sinew compare`: this project beside the systems of the literature, on one sequence.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use miette::{IntoDiagnostic, WrapErr, miette};
@@ -83,7 +83,12 @@ pub fn run(arguments: &CompareArguments, console: &Console) -> Result<(), Failur
         let bytes = load_package(path)?;
         let name = match &arguments.ours[..] {
             [_] => "Sinew".to_owned(),
-            _ => format!("Sinew, {}", path.file_stem().unwrap_or_default().to_string_lossy()),
+            paths => {
+                let stem = path.file_stem().unwrap_or_default();
+                let alone = paths.iter().filter(|other| other.file_stem() == Some(stem)).count() == 1;
+                let name = if alone { Path::new(stem) } else { path };
+                format!("Sinew, {}", name.display())
+            }
         };
         ours.push((path, name, bytes));
     }

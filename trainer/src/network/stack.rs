@@ -9,7 +9,7 @@ use burn::tensor::{Device, IndexingUpdateOp, Int, Tensor, TensorData};
 use sinew_formats::package::FEATURE_COUNT;
 
 use super::attention::Attention;
-use super::device::training_device;
+use super::device::model_device;
 use super::loss::{LossSettings, LossTerms, NORM_SOFTENING};
 use super::ring::RingMean;
 use super::weights::{LevelWeights, StackWeights};
@@ -65,7 +65,7 @@ pub struct DifferentiableStack {
 impl DifferentiableStack {
     /// As [`super::kernel::Kernel::new`].
     pub fn new(ring: &RingMean, vertex_weights: &[f32], modes: &[f32], attention: Attention) -> Self {
-        let device = training_device().autodiff();
+        let device = model_device().autodiff();
         let vertex_count = ring.vertex_count();
         let len = vertex_count * FEATURE_COUNT;
         let mode_count = modes.len() / len;

@@ -87,8 +87,9 @@ fn figures(row: &Row) -> Option<&Figures> {
 
 /// E_rms over the logarithm of the weight; a weight of zero has no place there and stands in the table alone.
 fn curve(rows: &[&Row], name: &str) -> String {
-    let of: [(&str, fn(&Figures) -> f64); 3] = [
+    let of: [(&str, fn(&Figures) -> f64); 4] = [
         ("encoder", |f| f.encoder.e_rms),
+        ("linear encoder", |f| f.linear_encoder.e_rms),
         ("features", |f| f.feature_projection.e_rms),
         ("positions", |f| f.position_projection.e_rms),
     ];
@@ -136,20 +137,25 @@ fn write_grid(page: &mut String, rows: &[&Row]) {
 
 fn write_table(page: &mut String, rows: &[&Row]) {
     page.push_str(
-        "<div class=\"scroll\"><table><thead><tr><th></th><th>K</th><th>encoder E<sub>rms</sub></th><th>STED</th>\
+        "<div class=\"scroll\"><table><thead><tr><th></th><th>K</th><th>encoder E<sub>rms</sub></th><th>STED</th><th>linear E<sub>rms</sub></th><th>STED</th>\
          <th>features E<sub>rms</sub></th><th>STED</th><th>positions E<sub>rms</sub></th><th>STED</th>\
-         <th>missed, trained</th><th>missed, unseen</th><th>steps</th><th>training</th></tr></thead><tbody>",
+         <th>missed, trained</th><th>linear</th><th>missed, unseen</th><th>linear</th><th>steps</th><th>training</th></tr></thead><tbody>",
     );
     for row in rows {
         let class = if row.is_base { " class=\"main\"" } else { "" };
         let _ = write!(page, "<tr{class}><td>{}</td>", escape(&row.name));
         match &row.outcome {
             Outcome::Failed(why) => {
-                let _ = write!(page, "<td class=\"note\" colspan=\"11\">failed: {}</td>", escape(why));
+                let _ = write!(page, "<td class=\"note\" colspan=\"15\">failed: {}</td>", escape(why));
             }
             Outcome::Measured(f) => {
                 let _ = write!(page, "<td>{} of {}</td>", f.components, f.components_asked);
-                for scores in [&f.encoder, &f.feature_projection, &f.position_projection] {
+                for scores in [
+                    &f.encoder,
+                    &f.linear_encoder,
+                    &f.feature_projection,
+                    &f.position_projection,
+                ] {
                     let _ = write!(
                         page,
                         "<td>{}</td><td>{}</td>",
@@ -159,9 +165,11 @@ fn write_table(page: &mut String, rows: &[&Row]) {
                 }
                 let _ = write!(
                     page,
-                    "<td>{}</td><td>{}</td><td>{}</td><td>{:.0} s</td>",
+                    "<td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{:.0} s</td>",
                     number(f.missed_training),
+                    number(f.missed_training_linear),
                     number(f.missed_unseen),
+                    number(f.missed_unseen_linear),
                     f.steps,
                     f.training_seconds
                 );
@@ -190,10 +198,13 @@ mod tests {
             components_asked: 60,
             components: 57,
             encoder: scores,
+            linear_encoder: scores,
             feature_projection: scores,
             position_projection: scores,
             missed_training: 0.01,
             missed_unseen: 0.04,
+            missed_training_linear: 0.005,
+            missed_unseen_linear: 0.02,
             steps: 300,
             stop_reason: "all steps done".to_owned(),
             training_seconds: 12.0,

@@ -3,7 +3,7 @@
 use burn::optim::{Adam, AdamConfig, AdamState, AdaptiveMomentumState, Optimizer};
 use burn::tensor::{Device, Tensor, TensorData};
 
-use crate::network::device::training_device;
+use crate::network::device::host_device;
 use crate::network::weights::StackWeights;
 
 /// Adam's guard against division by zero; the paper's framework default. burn's own default, 1e-5, is above many of
@@ -39,7 +39,7 @@ impl Stepper {
         let adam = AdamConfig::new().with_epsilon(EPSILON).build();
         Self {
             adam,
-            device: training_device(),
+            device: host_device(),
             components: None,
             convolutions: None,
         }
