@@ -63,7 +63,10 @@ pub fn fit(
         _ => None,
     };
     let (state, stepper) = match resumed {
-        Some((state, moments)) => (state, Stepper::restore(moments)),
+        Some((state, moments)) => {
+            let stepper = Stepper::restore(moments, &state.weights);
+            (state, stepper)
+        }
         None => (first_state(start, settings, validate), Stepper::new()),
     };
     let supports = settings.keep_supports.then_some(supports);
