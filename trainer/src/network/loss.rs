@@ -210,7 +210,10 @@ fn row_sparsity(row: &[f32], outside: &[bool], factor: f32, unit: bool, gradient
         cost += f64::from(norm - NORM_SOFTENING);
         along += f64::from(energy / norm);
         let share = factor * scale * scale / norm;
-        slope.iter_mut().zip(values).for_each(|(sum, value)| *sum += share * value);
+        slope
+            .iter_mut()
+            .zip(values)
+            .for_each(|(sum, value)| *sum += share * value);
     }
     if unit {
         // A row's length cannot change what it costs: take out the part of the gradient along the row.

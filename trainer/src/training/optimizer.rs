@@ -63,7 +63,14 @@ impl Stepper {
         let (adam, device) = (&self.adam, &self.device);
         let mut values = weights.flat_convolutions();
         let slope = gradient.flat_convolutions();
-        step_piece(adam, device, convolution_rate, &mut values, &slope, &mut self.convolutions);
+        step_piece(
+            adam,
+            device,
+            convolution_rate,
+            &mut values,
+            &slope,
+            &mut self.convolutions,
+        );
         weights.set_flat_convolutions(&values);
         let pieces: Vec<(&mut [f32], &[f32])> = weights
             .blocks_mut()

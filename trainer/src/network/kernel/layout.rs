@@ -1,0 +1,154 @@
+//! Between the plain order of numbers outside the kernel and the kernel's lanes.
+
+use rayon::prelude::*;
+use sinew_formats::package::FEATURE_COUNT;
+
+use super::CHUNK;
+use super::lanes::{Features, LANE_COUNT, Narrow};
+use super::simd::Group;
+use crate::network::weights::BlockWeights;
+
+/// `[N][V][9]` to `[V][groups]`; lanes without a shape are zero, and stay without effect since zero maps to zero.
+pub(super) fn shapes_into_lanes<G: Group>(shapes: &[f32], vertex_count: usize, lanes: &mut Vec<Features<G>>) {
+    let shape_len = vertex_count * FEATURE_COUNT;
+    let group_count = (shapes.len() / shape_len).div_ceil(G::LEN);
+    lanes.resize(vertex_count * group_count, [G::ZERO; FEATURE_COUNT]);
+    lanes
+        .par_chunks_mut((CHUNK * group_count).max(1))
+        .enumerate()
+        .for_each(|(chunk, rows)| {
+            for (i, row) in rows.iter_mut().enumerate() {
+                let (v, p) = (chunk * CHUNK + i / group_count, i % group_count);
+                *row = [G::ZERO; FEATURE_COUNT];
+                for (n, shape) in shapes.chunks_exact(shape_len).skip(p * G::LEN).take(G::LEN).enumerate() {
+                    for (c, value) in shape[v * FEATURE_COUNT..(v + 1) * FEATURE_COUNT].iter().enumerate() {
+                        row[c].as_mut()[n] = *value;
+                    }
+                }
+            }
+        });
+}
+
+/// The inverse of [`shapes_into_lanes`].
+pub(super) fn shapes_from_lanes<G: Group>(lanes: &[Features<G>], vertex_count: usize, shapes: &mut [f32]) {
+    let group_count = lanes.len() / vertex_count;
+    shapes
+        .par_chunks_mut(vertex_count * FEATURE_COUNT)
+        .enumerate()
+        .for_each(|(m, shape)| {
+            for (v, values) in shape.as_chunks_mut::<FEATURE_COUNT>().0.iter_mut().enumerate() {
+                let row = &lanes[v * group_count + m / G::LEN];
+                for c in 0..FEATURE_COUNT {
+                    values[c] = row[c].as_ref()[m % G::LEN];
+                }
+            }
+        });
+}
+
+/// `[block][K][V][9]` to `[blocks][V][groups of eight components]`; lanes without a component are zero.
+pub(super) fn components_into_lanes(
+    blocks: &[BlockWeights],
+    vertex_count: usize,
+    component_count: usize,
+    lanes: &mut Vec<Features<Narrow>>,
+) {
+    let width = component_count.div_ceil(LANE_COUNT);
+    lanes.resize(blocks.len() * vertex_count * width, [Narrow::ZERO; FEATURE_COUNT]);
+    let of_blocks = lanes.par_chunks_mut(vertex_count * width).zip(blocks);
+    of_blocks.for_each(|(lanes, block)| {
+        lanes
+            .par_chunks_mut(CHUNK * width)
+            .enumerate()
+            .for_each(|(chunk, lanes)| {
+                lanes.fill([Narrow::ZERO; FEATURE_COUNT]);
+                let rows = block.components.chunks_exact(vertex_count * FEATURE_COUNT);
+                for (k, row) in rows.enumerate() {
+                    let (q, n) = (k / LANE_COUNT, k % LANE_COUNT);
+                    let row = &row[chunk * CHUNK * FEATURE_COUNT..];
+                    for (values, lanes) in row
+                        .as_chunks::<FEATURE_COUNT>()
+                        .0
+                        .iter()
+                        .zip(lanes.chunks_exact_mut(width))
+                    {
+                        for c in 0..FEATURE_COUNT {
+                            lanes[q][c][n] = values[c];
+                        }
+                    }
+                }
+            });
+    });
+}
+
+/// The inverse of [`components_into_lanes`].
+pub(super) fn components_from_lanes(lanes: &[Features<Narrow>], vertex_count: usize, blocks: &mut [BlockWeights]) {
+    let block_len = lanes.len() / blocks.len();
+    let of_blocks = lanes.par_chunks(block_len).zip(blocks);
+    of_blocks.for_each(|(lanes, block)| {
+        let rows = block.components.par_chunks_exact_mut(vertex_count * FEATURE_COUNT);
+        rows.enumerate().for_each(|(k, row)| {
+            let (q, n) = (k / LANE_COUNT, k % LANE_COUNT);
+            let vertices = lanes.chunks_exact(block_len / vertex_count);
+            for (values, lanes) in row.as_chunks_mut::<FEATURE_COUNT>().0.iter_mut().zip(vertices) {
+                for c in 0..FEATURE_COUNT {
+                    values[c] = lanes[q][c][n];
+                }
+            }
+        });
+    });
+}
+
+/// A field `[blocks][len of a block]` cut into chunks of vertices, each with its part of every block.
+pub(super) fn chunks_of_blocks<T>(field: &mut [T], block_count: usize, chunk_len: usize) -> Vec<Vec<&mut [T]>> {
+    let block_len = field.len() / block_count;
+    let mut chunks: Vec<Vec<&mut [T]>> = Vec::new();
+    chunks.resize_with(block_len.div_ceil(chunk_len), || Vec::with_capacity(block_count));
+    for block in field.chunks_exact_mut(block_len.max(1)) {
+        for (chunk, part) in chunks.iter_mut().zip(block.chunks_mut(chunk_len)) {
+            chunk.push(part);
+        }
+    }
+    chunks
+}
+
+/// `[blocks][groups][K]` to `[blocks][shapes][groups of eight components]`, shapes that fill no lane left out.
+pub(super) fn transpose_latents<G: Group>(
+    latents: &[G],
+    block_count: usize,
+    group_count: usize,
+    shape_count: usize,
+) -> Vec<Narrow> {
+    let component_count = latents.len() / (block_count * group_count);
+    let width = component_count.div_ceil(LANE_COUNT);
+    let mut transposed = vec![[0.0; LANE_COUNT]; block_count * shape_count * width];
+    for (b, latents) in latents.chunks_exact(group_count * component_count).enumerate() {
+        for m in 0..shape_count {
+            for k in 0..component_count {
+                let z = latents[m / G::LEN * component_count + k].as_ref()[m % G::LEN];
+                transposed[(b * shape_count + m) * width + k / LANE_COUNT][k % LANE_COUNT] = z;
+            }
+        }
+    }
+    transposed
+}
+
+/// Adds up chunks in order, in double precision.
+pub(super) fn add_lanes<G: Group>(chunks: &[Vec<G>], len: usize) -> Vec<G> {
+    let mut sums = vec![0.0_f64; len * G::LEN];
+    for chunk in chunks {
+        for (sums, group) in sums.chunks_exact_mut(G::LEN).zip(chunk) {
+            sums.iter_mut()
+                .zip(group.as_ref())
+                .for_each(|(sum, value)| *sum += f64::from(*value));
+        }
+    }
+    let mut lanes = vec![G::ZERO; len];
+    for (group, sums) in lanes.iter_mut().zip(sums.chunks_exact(G::LEN)) {
+        group
+            .as_mut()
+            .iter_mut()
+            .zip(sums)
+            .for_each(|(value, sum)| *value = *sum as f32);
+    }
+    lanes
+}
