@@ -258,7 +258,7 @@ wide! {
 }
 
 wide! {
-    /// Back through `convolve_components`: adds to dL/dC, answers the convolution's gradient of each block.
+    /// Back through `convolve_components`: writes dL/dC, answers the convolution's gradient of each block.
     fn convolve_components_back<G>(
         simd,
         start: usize,
@@ -283,7 +283,7 @@ wide! {
                 }
                 let g = load(simd, at(v));
                 sums.push(simd, &g, &gathered, &load(simd, &components[v * width + q]));
-                let mut own = load(simd, component_gradient);
+                let mut own = zero(simd);
                 add_transposed(simd, &mut own, &block.decoder.point, &g);
                 add_transposed(simd, &mut own, &block.decoder.neighbour, &gathered);
                 store(simd, &own, component_gradient);

@@ -5,7 +5,7 @@ use sinew_formats::package::{FEATURE_COUNT, GraphConvRecord};
 
 use super::backward::{self, SourceGradient};
 use super::forward::{self, Source};
-use super::lanes::Features;
+use super::lanes::{Features, LANE_COUNT};
 use super::layout::{add_lanes, chunks_of_blocks, shapes_into_lanes, transpose_latents};
 use super::level::Level;
 use super::simd::Group;
@@ -226,7 +226,7 @@ impl<G: Group> Band<G> {
     }
 
     /// From dL/de and dL/d(x - y) back to the latents and, in `own`, to dL/dhat and the decoders' biases. `mask_gradient`:
-    /// of the level above, empty at the root.
+    /// of the level above, empty at the root. `is_first`: no other band was here, so dL/dhat begins at zero.
     pub(super) fn decode_back(
         &mut self,
         l: usize,
@@ -234,6 +234,7 @@ impl<G: Group> Band<G> {
         own: &mut Level,
         mask_gradient: &mut [f32],
         block_factor: f32,
+        is_first: bool,
     ) {
         if self.group_count == 0 {
             return;
@@ -259,6 +260,11 @@ impl<G: Group> Band<G> {
                 .enumerate()
                 .map(|(chunk, (mut hat_gradient, mut source_gradient))| {
                     let mut latent_gradient = vec![G::ZERO; latent_count];
+                    if is_first {
+                        for hat_gradient in &mut hat_gradient {
+                            hat_gradient.fill([[0.0; LANE_COUNT]; FEATURE_COUNT]);
+                        }
+                    }
                     for residuals in &mut source_gradient.residuals {
                         residuals.fill([G::ZERO; FEATURE_COUNT]);
                     }

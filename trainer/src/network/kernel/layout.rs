@@ -56,27 +56,22 @@ pub(super) fn components_into_lanes(
     lanes.resize(blocks.len() * vertex_count * width, [Narrow::ZERO; FEATURE_COUNT]);
     let of_blocks = lanes.par_chunks_mut(vertex_count * width).zip(blocks);
     of_blocks.for_each(|(lanes, block)| {
-        lanes
-            .par_chunks_mut(CHUNK * width)
-            .enumerate()
-            .for_each(|(chunk, lanes)| {
-                lanes.fill([Narrow::ZERO; FEATURE_COUNT]);
-                let rows = block.components.chunks_exact(vertex_count * FEATURE_COUNT);
-                for (k, row) in rows.enumerate() {
-                    let (q, n) = (k / LANE_COUNT, k % LANE_COUNT);
-                    let row = &row[chunk * CHUNK * FEATURE_COUNT..];
-                    for (values, lanes) in row
-                        .as_chunks::<FEATURE_COUNT>()
-                        .0
-                        .iter()
-                        .zip(lanes.chunks_exact_mut(width))
-                    {
-                        for c in 0..FEATURE_COUNT {
-                            lanes[q][c][n] = values[c];
-                        }
+        let rows: Vec<&[[f32; FEATURE_COUNT]]> = block
+            .components
+            .chunks_exact(vertex_count * FEATURE_COUNT)
+            .map(|row| row.as_chunks().0)
+            .collect();
+        for (v, lanes) in lanes.chunks_exact_mut(width).enumerate() {
+            for (lanes, rows) in lanes.iter_mut().zip(rows.chunks(LANE_COUNT)) {
+                let mut features = [Narrow::ZERO; FEATURE_COUNT];
+                for (n, row) in rows.iter().enumerate() {
+                    for c in 0..FEATURE_COUNT {
+                        features[c][n] = row[v][c];
                     }
                 }
-            });
+                *lanes = features;
+            }
+        }
     });
 }
 
@@ -85,16 +80,17 @@ pub(super) fn components_from_lanes(lanes: &[Features<Narrow>], vertex_count: us
     let block_len = lanes.len() / blocks.len();
     let of_blocks = lanes.par_chunks(block_len).zip(blocks);
     of_blocks.for_each(|(lanes, block)| {
-        let rows = block.components.par_chunks_exact_mut(vertex_count * FEATURE_COUNT);
-        rows.enumerate().for_each(|(k, row)| {
-            let (q, n) = (k / LANE_COUNT, k % LANE_COUNT);
-            let vertices = lanes.chunks_exact(block_len / vertex_count);
-            for (values, lanes) in row.as_chunks_mut::<FEATURE_COUNT>().0.iter_mut().zip(vertices) {
-                for c in 0..FEATURE_COUNT {
-                    values[c] = lanes[q][c][n];
+        let rows = block.components.chunks_exact_mut(vertex_count * FEATURE_COUNT);
+        let mut rows: Vec<&mut [[f32; FEATURE_COUNT]]> = rows.map(|row| row.as_chunks_mut().0).collect();
+        for (v, lanes) in lanes.chunks_exact(block_len / vertex_count).enumerate() {
+            for (lanes, rows) in lanes.iter().zip(rows.chunks_mut(LANE_COUNT)) {
+                for (n, row) in rows.iter_mut().enumerate() {
+                    for c in 0..FEATURE_COUNT {
+                        row[v][c] = lanes[c][n];
+                    }
                 }
             }
-        });
+        }
     });
 }
 

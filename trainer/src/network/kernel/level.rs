@@ -70,12 +70,10 @@ impl Level {
         }
     }
 
-    /// Clears all sums of gradients.
+    /// Clears all sums of gradients but dL/dhat and dL/dC, which their first pass overwrites.
     pub(super) fn clear_gradient(&mut self) {
         for sums in [&mut self.hat_gradient, &mut self.component_gradient] {
             sums.resize(self.components.len(), [[0.0; LANE_COUNT]; FEATURE_COUNT]);
-            sums.par_chunks_mut(CHUNK * LANE_COUNT)
-                .for_each(|sums| sums.fill([[0.0; LANE_COUNT]; FEATURE_COUNT]));
         }
         self.mask_gradient.clear();
         self.mask_gradient.resize(self.masks.len(), 0.0);
@@ -83,7 +81,7 @@ impl Level {
         self.decoders.clear(self.block_count);
     }
 
-    /// From dL/dhat and dL/dmask, once they are complete, to the decoders and to dL/dC.
+    /// From dL/dhat and dL/dmask, once they are complete, to the decoders and, the first to write it, to dL/dC.
     pub(super) fn backward(&mut self, level: &LevelWeights, ring: &RingMean, floor: f32) {
         let (width, k_count, vertex_count) = (self.width(), self.component_count, ring.vertex_count());
         let (components, hat_gradient) = (&self.components, &self.hat_gradient);

@@ -129,6 +129,21 @@ impl Kernel {
         outside: &[Vec<bool>],
         settings: &LossSettings,
     ) -> (LossTerms, StackWeights) {
+        let mut gradient = StackWeights::zeros(weights.vertex_count, &weights.component_counts());
+        let terms = self.differentiate_into(weights, shapes, outside, settings, &mut gradient);
+        (terms, gradient)
+    }
+
+    /// The same, into a gradient that may be used again and again; its numbers do not matter, its shape must be that of
+    /// the weights.
+    pub fn differentiate_into(
+        &mut self,
+        weights: &StackWeights,
+        shapes: &[f32],
+        outside: &[Vec<bool>],
+        settings: &LossSettings,
+        gradient: &mut StackWeights,
+    ) -> LossTerms {
         let shape_count = shapes.len() / (weights.vertex_count * FEATURE_COUNT);
         let per_shape = settings.reconstruction_weight / shape_count as f32;
         let block_error = self.forward(weights, shapes);
@@ -142,17 +157,15 @@ impl Kernel {
             .narrow
             .measure_error(vertex_weights, modes, total_factor, position_factor);
         let (total, position) = (wide.0 + narrow.0, wide.1 + narrow.1);
-        let mut gradient = StackWeights::zeros(weights.vertex_count, &weights.component_counts());
         let block_factor = 2.0 * per_shape * settings.block_weight;
-        let range = self.backward(weights, settings, block_factor, &mut gradient);
-        let terms = LossTerms {
+        let range = self.backward(weights, settings, block_factor, gradient);
+        LossTerms {
             block: per_shape * settings.block_weight * block_error as f32,
             total: per_shape * settings.total_weight * total as f32,
             position: per_shape * settings.position_weight * position as f32,
-            sparsity: sparsity(weights, outside, settings, &mut gradient),
+            sparsity: sparsity(weights, outside, settings, gradient),
             range,
-        };
-        (terms, gradient)
+        }
     }
 
     /// Fills every level and the total error; answers the sum over blocks of the weighted squared residuals.
@@ -215,8 +228,10 @@ impl Kernel {
                     .checked_sub(1)
                     .map_or(1, |above| weights.levels[above].component_count),
             };
-            self.wide.decode_back(l, view, own, mask_gradient, block_factor);
-            self.narrow.decode_back(l, view, own, mask_gradient, block_factor);
+            let is_first = self.wide.shape_count == 0;
+            self.wide.decode_back(l, view, own, mask_gradient, block_factor, true);
+            self.narrow
+                .decode_back(l, view, own, mask_gradient, block_factor, is_first);
             own.backward(level, &self.ring, floor);
             for b in 0..level.blocks.len() {
                 range += penalize_range(&mut self.wide, &mut self.narrow, l, level.component_count, b, settings);
