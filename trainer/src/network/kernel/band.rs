@@ -76,10 +76,10 @@ pub(super) struct LevelView<'a> {
 
 impl<G: Group> Band<G> {
     /// Takes shapes `[N][V][9]`.
-    pub(super) fn take(&mut self, shapes: &[f32], vertex_count: usize, level_count: usize) {
-        self.shape_count = shapes.len() / (vertex_count * FEATURE_COUNT);
+    pub(super) fn take(&mut self, shapes: &[f32], order: &[u32], level_count: usize) {
+        self.shape_count = shapes.len() / (order.len() * FEATURE_COUNT);
         self.group_count = self.shape_count.div_ceil(G::LEN);
-        shapes_into_lanes(shapes, vertex_count, &mut self.shapes);
+        shapes_into_lanes(shapes, order, &mut self.shapes);
         self.error.clone_from(&self.shapes);
         self.levels.resize_with(level_count, BandLevel::default);
     }

@@ -1,4 +1,5 @@
-//! Between the plain order of numbers outside the kernel and the kernel's lanes.
+//! Between the plain order of numbers outside the kernel and the kernel's lanes. `order`: the mesh's vertex at each of
+//! the kernel's rows.
 
 use rayon::prelude::*;
 use sinew_formats::package::FEATURE_COUNT;
@@ -9,7 +10,8 @@ use super::simd::Group;
 use crate::network::weights::BlockWeights;
 
 /// `[N][V][9]` to `[V][groups]`; lanes without a shape are zero, and stay without effect since zero maps to zero.
-pub(super) fn shapes_into_lanes<G: Group>(shapes: &[f32], vertex_count: usize, lanes: &mut Vec<Features<G>>) {
+pub(super) fn shapes_into_lanes<G: Group>(shapes: &[f32], order: &[u32], lanes: &mut Vec<Features<G>>) {
+    let vertex_count = order.len();
     let shape_len = vertex_count * FEATURE_COUNT;
     let group_count = (shapes.len() / shape_len).div_ceil(G::LEN);
     lanes.resize(vertex_count * group_count, [G::ZERO; FEATURE_COUNT]);
@@ -18,7 +20,7 @@ pub(super) fn shapes_into_lanes<G: Group>(shapes: &[f32], vertex_count: usize, l
         .enumerate()
         .for_each(|(chunk, rows)| {
             for (i, row) in rows.iter_mut().enumerate() {
-                let (v, p) = (chunk * CHUNK + i / group_count, i % group_count);
+                let (v, p) = (order[chunk * CHUNK + i / group_count] as usize, i % group_count);
                 *row = [G::ZERO; FEATURE_COUNT];
                 for (n, shape) in shapes.chunks_exact(shape_len).skip(p * G::LEN).take(G::LEN).enumerate() {
                     for (c, value) in shape[v * FEATURE_COUNT..(v + 1) * FEATURE_COUNT].iter().enumerate() {
@@ -30,14 +32,16 @@ pub(super) fn shapes_into_lanes<G: Group>(shapes: &[f32], vertex_count: usize, l
 }
 
 /// The inverse of [`shapes_into_lanes`].
-pub(super) fn shapes_from_lanes<G: Group>(lanes: &[Features<G>], vertex_count: usize, shapes: &mut [f32]) {
+pub(super) fn shapes_from_lanes<G: Group>(lanes: &[Features<G>], order: &[u32], shapes: &mut [f32]) {
+    let vertex_count = order.len();
     let group_count = lanes.len() / vertex_count;
     shapes
         .par_chunks_mut(vertex_count * FEATURE_COUNT)
         .enumerate()
         .for_each(|(m, shape)| {
-            for (v, values) in shape.as_chunks_mut::<FEATURE_COUNT>().0.iter_mut().enumerate() {
-                let row = &lanes[v * group_count + m / G::LEN];
+            let values = shape.as_chunks_mut::<FEATURE_COUNT>().0;
+            for (row, &v) in order.iter().enumerate() {
+                let (row, values) = (&lanes[row * group_count + m / G::LEN], &mut values[v as usize]);
                 for c in 0..FEATURE_COUNT {
                     values[c] = row[c].as_ref()[m % G::LEN];
                 }
@@ -48,10 +52,11 @@ pub(super) fn shapes_from_lanes<G: Group>(lanes: &[Features<G>], vertex_count: u
 /// `[block][K][V][9]` to `[blocks][V][groups of eight components]`; lanes without a component are zero.
 pub(super) fn components_into_lanes(
     blocks: &[BlockWeights],
-    vertex_count: usize,
+    order: &[u32],
     component_count: usize,
     lanes: &mut Vec<Features<Narrow>>,
 ) {
+    let vertex_count = order.len();
     let width = component_count.div_ceil(LANE_COUNT);
     lanes.resize(blocks.len() * vertex_count * width, [Narrow::ZERO; FEATURE_COUNT]);
     let of_blocks = lanes.par_chunks_mut(vertex_count * width).zip(blocks);
@@ -61,12 +66,12 @@ pub(super) fn components_into_lanes(
             .chunks_exact(vertex_count * FEATURE_COUNT)
             .map(|row| row.as_chunks().0)
             .collect();
-        for (v, lanes) in lanes.chunks_exact_mut(width).enumerate() {
+        for (&v, lanes) in order.iter().zip(lanes.chunks_exact_mut(width)) {
             for (lanes, rows) in lanes.iter_mut().zip(rows.chunks(LANE_COUNT)) {
                 let mut features = [Narrow::ZERO; FEATURE_COUNT];
                 for (n, row) in rows.iter().enumerate() {
                     for c in 0..FEATURE_COUNT {
-                        features[c][n] = row[v][c];
+                        features[c][n] = row[v as usize][c];
                     }
                 }
                 *lanes = features;
@@ -76,17 +81,18 @@ pub(super) fn components_into_lanes(
 }
 
 /// The inverse of [`components_into_lanes`].
-pub(super) fn components_from_lanes(lanes: &[Features<Narrow>], vertex_count: usize, blocks: &mut [BlockWeights]) {
+pub(super) fn components_from_lanes(lanes: &[Features<Narrow>], order: &[u32], blocks: &mut [BlockWeights]) {
+    let vertex_count = order.len();
     let block_len = lanes.len() / blocks.len();
     let of_blocks = lanes.par_chunks(block_len).zip(blocks);
     of_blocks.for_each(|(lanes, block)| {
         let rows = block.components.chunks_exact_mut(vertex_count * FEATURE_COUNT);
         let mut rows: Vec<&mut [[f32; FEATURE_COUNT]]> = rows.map(|row| row.as_chunks_mut().0).collect();
-        for (v, lanes) in lanes.chunks_exact(block_len / vertex_count).enumerate() {
+        for (&v, lanes) in order.iter().zip(lanes.chunks_exact(block_len / vertex_count)) {
             for (lanes, rows) in lanes.iter().zip(rows.chunks_mut(LANE_COUNT)) {
                 for (n, row) in rows.iter_mut().enumerate() {
                     for c in 0..FEATURE_COUNT {
-                        row[v][c] = lanes[c][n];
+                        row[v as usize][c] = lanes[c][n];
                     }
                 }
             }

@@ -39,10 +39,10 @@ impl Level {
     }
 
     /// Takes over the weights; where a floor is given, finds masks (equal ones where it is infinite).
-    pub(super) fn forward(&mut self, level: &LevelWeights, ring: &RingMean, mask_floor: Option<f32>) {
+    pub(super) fn forward(&mut self, level: &LevelWeights, order: &[u32], ring: &RingMean, mask_floor: Option<f32>) {
         let vertex_count = ring.vertex_count();
         (self.block_count, self.component_count) = (level.blocks.len(), level.component_count);
-        components_into_lanes(&level.blocks, vertex_count, self.component_count, &mut self.components);
+        components_into_lanes(&level.blocks, order, self.component_count, &mut self.components);
         let (width, k_count, components) = (self.width(), self.component_count, &self.components);
         self.hat.resize(components.len(), [[0.0; LANE_COUNT]; FEATURE_COUNT]);
         chunks_of_blocks(&mut self.hat, self.block_count, CHUNK * width)
@@ -121,8 +121,8 @@ impl Level {
     }
 
     /// Writes the complete gradient in the order of weights.
-    pub(super) fn write_gradient(&self, vertex_count: usize, blocks: &mut [BlockWeights]) {
-        components_from_lanes(&self.component_gradient, vertex_count, blocks);
+    pub(super) fn write_gradient(&self, order: &[u32], blocks: &mut [BlockWeights]) {
+        components_from_lanes(&self.component_gradient, order, blocks);
         for (b, block) in blocks.iter_mut().enumerate() {
             block.encoder = self.encoders.convolution(b);
             block.decoder = self.decoders.convolution(b);

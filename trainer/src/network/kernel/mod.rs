@@ -37,13 +37,17 @@ pub const MASK_FLOOR: f32 = 1e-6;
 /// The g_i of the position term, transposed.
 struct Modes {
     count: usize,
-    /// Shape: `[V][9][count]`.
+    /// In the order of rows. Shape: `[V][9][count]`.
     values: Vec<f32>,
 }
 
 /// The network bound to a mesh, with its buffers. V vertices.
 pub struct Kernel {
+    /// The mesh's vertex at each row of the fields here, neighbours close together.
+    order: Vec<u32>,
+    /// In the order of rows.
     ring: RingMean,
+    /// In the order of rows. Shape: `[V]`.
     vertex_weights: Vec<f32>,
     attention: Attention,
     modes: Modes,
@@ -69,17 +73,18 @@ impl Kernel {
     /// `vertex_weights`: shape `[V]`, areas with mean one. `modes`: the g_i of the position term, shape `[I][V][9]`, or
     /// empty. Both must fit the ring's V.
     pub fn new(ring: RingMean, vertex_weights: &[f32], modes: &[f32], attention: Attention) -> Self {
+        let order = ring.breadth_first_order();
         let len = ring.vertex_count() * FEATURE_COUNT;
         let mode_count = modes.len() / len;
-        let mut transposed = vec![0.0; mode_count * len];
-        for (i, mode) in modes.chunks_exact(len).enumerate() {
-            mode.iter()
-                .enumerate()
-                .for_each(|(at, &value)| transposed[at * mode_count + i] = value);
+        let mut transposed = Vec::with_capacity(modes.len());
+        for &v in &order {
+            for at in v as usize * FEATURE_COUNT..(v as usize + 1) * FEATURE_COUNT {
+                transposed.extend(modes.chunks_exact(len).map(|mode| mode[at]));
+            }
         }
         Self {
-            ring,
-            vertex_weights: vertex_weights.to_vec(),
+            ring: ring.reordered(&order),
+            vertex_weights: order.iter().map(|&v| vertex_weights[v as usize]).collect(),
             attention,
             modes: Modes {
                 count: mode_count,
@@ -89,6 +94,7 @@ impl Kernel {
             levels: Vec::new(),
             wide: Band::default(),
             narrow: Band::default(),
+            order,
         }
     }
 
@@ -97,8 +103,8 @@ impl Kernel {
         self.forward(weights, shapes);
         let mut errors = vec![0.0; shapes.len()];
         let wide_len = self.wide.shape_count * weights.vertex_count * FEATURE_COUNT;
-        shapes_from_lanes(&self.wide.error, weights.vertex_count, &mut errors[..wide_len]);
-        shapes_from_lanes(&self.narrow.error, weights.vertex_count, &mut errors[wide_len..]);
+        shapes_from_lanes(&self.wide.error, &self.order, &mut errors[..wide_len]);
+        shapes_from_lanes(&self.narrow.error, &self.order, &mut errors[wide_len..]);
         let shape_count = self.wide.shape_count + self.narrow.shape_count;
         let latents = weights.levels.iter().enumerate().map(|(l, level)| {
             let k_count = level.component_count;
@@ -178,14 +184,14 @@ impl Kernel {
             0
         };
         let (wide, narrow) = shapes.split_at(group_count * WIDE_LANE_COUNT * shape_len);
-        self.wide.take(wide, vertex_count, level_count);
-        self.narrow.take(narrow, vertex_count, level_count);
+        self.wide.take(wide, &self.order, level_count);
+        self.narrow.take(narrow, &self.order, level_count);
         self.levels.resize_with(level_count, Level::default);
         let floor = self.attention.floor(vertex_count);
         let mut loss = 0.0;
         for (l, level) in weights.levels.iter().enumerate() {
             let (above, rest) = self.levels.split_at_mut(l);
-            rest[0].forward(level, &self.ring, (l + 1 < level_count).then_some(floor));
+            rest[0].forward(level, &self.order, &self.ring, (l + 1 < level_count).then_some(floor));
             let view = LevelView {
                 weights: level,
                 ring: &self.ring,
@@ -238,7 +244,7 @@ impl Kernel {
             }
             self.wide.encode_back(l, view, own, mask_gradient);
             self.narrow.encode_back(l, view, own, mask_gradient);
-            own.write_gradient(weights.vertex_count, &mut gradient.levels[l].blocks);
+            own.write_gradient(&self.order, &mut gradient.levels[l].blocks);
         }
         range
     }
