@@ -1,6 +1,7 @@
 //! One epoch of training in three ways, in one run: the fused kernel, burn's plain tensors, and PyTorch on the CPU
 //! (`peers/epoch.py`) with the same network, the same numbers and the same algebra.
-//! `cargo bench -p sinew-trainer --bench epoch`; words choose sizes by their names, `quick` takes fewer epochs.
+//! `cargo bench -p sinew-trainer --bench epoch`; words choose sizes by their names, `quick` takes fewer epochs,
+//! `kernel` measures the fused kernel alone.
 //!
 //! An epoch is the loss and all gradients on the full batch and one step of Adam. The loss of the first epoch must be the
 //! same in all three. `SINEW_PYTHON` names a python that has torch (else `python3`); without one that part is skipped,
@@ -190,7 +191,8 @@ fn median(mut values: Vec<f64>) -> f64 {
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
-    let quick = words.iter().any(|word| word == "quick");
+    let said = |option: &str| words.iter().any(|word| word == option);
+    let (quick, kernel_only) = (said("quick"), said("kernel"));
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
     println!(
         "seconds an epoch (median), {} + {} components, {threads} threads",
@@ -204,7 +206,8 @@ fn main() {
     for (sides, shape_count, epochs) in SIZES {
         let subject = Subject::new(sides, shape_count);
         let name = format!("{}/{shape_count}", subject.topology.vertex_count);
-        if !words.iter().all(|word| word == "quick" || name.contains(word.as_str())) {
+        let is_option = |word: &str| word == "quick" || word == "kernel";
+        if !words.iter().all(|word| is_option(word) || name.contains(word.as_str())) {
             continue;
         }
         let epochs = if quick { epochs.div_ceil(3) } else { epochs };
@@ -226,6 +229,9 @@ fn main() {
             );
         };
         print("fused kernel", &kernel);
+        if kernel_only {
+            continue;
+        }
         print("burn, plain tensors", &subject.fit(Engine::Tensors, 2));
         let folder = tempfile::tempdir().expect("a temporary folder");
         subject.write(folder.path());

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sinew_formats::package::FEATURE_COUNT;
 
-use super::weights::StackWeights;
+use super::weights::{StackWeights, row_length};
 
 /// Softens norms at zero, where they have no gradient. Entries of unit rows are near 0.01: a shift below their rounding.
 pub(crate) const NORM_SOFTENING: f32 = 1e-6;
@@ -145,10 +145,11 @@ impl<'a> SparsityRegions<'a> {
         let levels = weights.levels.iter().enumerate();
         let reaches = levels.flat_map(|(l, level)| level.blocks.iter().map(move |_| settings.sparsity_distance(l)));
         let outside = centres.iter().zip(reaches).map(|(centres, reach)| {
-            centres
-                .iter()
-                .flat_map(|centre| self.by_centre[centre].iter().map(move |&d| d >= reach))
-                .collect()
+            let mut outside = Vec::with_capacity(centres.len() * weights.vertex_count);
+            for centre in centres {
+                outside.extend(self.by_centre[centre].iter().map(|&d| d >= reach));
+            }
+            outside
         });
         outside.collect()
     }
@@ -157,7 +158,7 @@ impl<'a> SparsityRegions<'a> {
 /// The first vertex at which a row of C is longest.
 fn strongest_vertex(row: &[f32]) -> usize {
     let mut strongest = (0, f32::NEG_INFINITY);
-    for (v, values) in row.chunks_exact(FEATURE_COUNT).enumerate() {
+    for (v, values) in row.as_chunks::<FEATURE_COUNT>().0.iter().enumerate() {
         let energy = values.iter().map(|value| value * value).sum();
         if energy > strongest.1 {
             strongest = (v, energy);
@@ -195,25 +196,24 @@ pub(crate) fn sparsity(
 
 /// One row's share of Ω; adds its gradient.
 fn row_sparsity(row: &[f32], outside: &[bool], factor: f32, unit: bool, gradient: &mut [f32]) -> f64 {
-    let length = if unit {
-        row.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt()
-    } else {
-        1.0
-    };
+    let length = if unit { row_length(row) } else { 1.0 };
     if length == 0.0 {
         return 0.0;
     }
     let scale = (1.0 / length) as f32;
     let (mut cost, mut along) = (0.0_f64, 0.0_f64);
-    for (v, values) in row.chunks_exact(FEATURE_COUNT).enumerate().filter(|&(v, _)| outside[v]) {
+    let vertices = row.as_chunks::<FEATURE_COUNT>().0.iter();
+    let slopes = gradient.as_chunks_mut::<FEATURE_COUNT>().0.iter_mut();
+    for ((values, slope), _) in vertices.zip(slopes).zip(outside).filter(|(_, outside)| **outside) {
         let energy = values.iter().map(|value| value * value).sum::<f32>() * scale * scale;
         let norm = (energy + NORM_SOFTENING * NORM_SOFTENING).sqrt();
         cost += f64::from(norm - NORM_SOFTENING);
         along += f64::from(energy / norm);
-        let own = &mut gradient[v * FEATURE_COUNT..(v + 1) * FEATURE_COUNT];
-        own.iter_mut()
+        let share = factor * scale * scale / norm;
+        slope
+            .iter_mut()
             .zip(values)
-            .for_each(|(sum, value)| *sum += factor * scale * scale * value / norm);
+            .for_each(|(sum, value)| *sum += share * value);
     }
     if unit {
         // A row's length cannot change what it costs: take out the part of the gradient along the row.

@@ -64,7 +64,10 @@ pub fn fit(
         _ => None,
     };
     let (state, stepper) = match resumed {
-        Some((state, moments)) => (state, Stepper::restore(moments)),
+        Some((state, moments)) => {
+            let stepper = Stepper::restore(moments, &state.weights);
+            (state, stepper)
+        }
         None => (first_state(start, settings, validate), Stepper::new()),
     };
     let supports = settings.keep_supports.then_some(supports);
@@ -83,6 +86,7 @@ pub fn fit(
             .unwrap_or(RATE_TIMES_ROOT_V / (input.topology.vertex_count as f32).sqrt()),
         state,
         stepper,
+        gradient: None,
         checkpoint: checkpoints.map(|path| (path.to_path_buf(), identity)),
         begun: Instant::now(),
     };
@@ -216,16 +220,22 @@ impl Network {
         }
     }
 
+    /// Answers the loss and overwrites `gradient`, which has the shape of the weights.
     fn differentiate(
         &mut self,
         weights: &StackWeights,
         batch: &[f32],
         outside: &[Vec<bool>],
         settings: &LossSettings,
-    ) -> (LossTerms, StackWeights) {
+        gradient: &mut StackWeights,
+    ) -> LossTerms {
         match self {
-            Self::Kernel(kernel) => kernel.differentiate(weights, batch, outside, settings),
-            Self::Tensors(model) => model.differentiate(weights, batch, outside, settings),
+            Self::Kernel(kernel) => kernel.differentiate_into(weights, batch, outside, settings, gradient),
+            Self::Tensors(model) => {
+                let (loss, own) = model.differentiate(weights, batch, outside, settings);
+                *gradient = own;
+                loss
+            }
         }
     }
 }
@@ -241,6 +251,8 @@ struct Run<'a> {
     rate: f32,
     state: FitState,
     stepper: Stepper,
+    /// Of the last step, if that trained all levels: its memory serves the next.
+    gradient: Option<StackWeights>,
     checkpoint: Option<(PathBuf, u64)>,
     begun: Instant,
 }
@@ -331,8 +343,12 @@ impl Run<'_> {
             0.0 => Vec::new(),
             _ => self.regions.outside(weights, &settings.loss),
         };
-        let (loss, mut gradient) = self.network.differentiate(weights, batch, &outside, &settings.loss);
-        if partial.is_some() {
+        let zeros = || StackWeights::zeros(weights.vertex_count, &weights.component_counts());
+        let mut gradient = self.gradient.take().unwrap_or_else(zeros);
+        let network = &mut self.network;
+        let loss = network.differentiate(weights, batch, &outside, &settings.loss, &mut gradient);
+        let is_partial = partial.is_some();
+        if is_partial {
             gradient = stage.complete(gradient, &state.weights);
         }
         let done = state.step - stage.steps.start;
@@ -355,6 +371,7 @@ impl Run<'_> {
             state.weights.levels[0].blocks[0].components[*at..at + kept.len()].copy_from_slice(kept);
             sound = state.weights.is_finite();
         }
+        self.gradient = Some(gradient).filter(|_| !is_partial);
         state.step += 1;
         if !sound {
             state.rollbacks += 1;

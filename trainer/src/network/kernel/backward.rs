@@ -2,424 +2,327 @@
 
 use sinew_formats::package::{FEATURE_COUNT, GraphConvRecord};
 
-use super::forward::energy;
+use super::forward::{Source, energies};
 use super::lanes::{
-    Features, Field, LANE_COUNT, Lane, ZERO_FEATURES, ZERO_LANE, add_product, add_scaled, add_transposed, ring_mean,
-    sum_lanes, wide,
+    Features, LANE_COUNT, Narrow, Registers, add_blend, add_projection, add_scaled, add_transposed, expand, load,
+    scaled, store, sum_features, sum_lanes, tanh_bias, wide, zero,
 };
+use super::simd::{Group, Simd};
+use super::sums::ConvolutionSums;
 use crate::network::ring::RingMean;
-use crate::network::weights::zero_convolution;
-
-/// A convolution's gradient, still spread over lanes.
-#[derive(Clone)]
-pub(crate) struct ConvolutionSums {
-    point: [Features; FEATURE_COUNT],
-    neighbour: [Features; FEATURE_COUNT],
-    bias: Features,
-}
-
-impl ConvolutionSums {
-    pub(crate) const ZERO: Self = Self {
-        point: [ZERO_FEATURES; FEATURE_COUNT],
-        neighbour: [ZERO_FEATURES; FEATURE_COUNT],
-        bias: ZERO_FEATURES,
-    };
-
-    /// Adds up lanes within chunks, then chunks in order, in double precision.
-    pub(crate) fn total<'a>(chunks: impl Iterator<Item = &'a Self> + Clone) -> GraphConvRecord {
-        let sum = |pick: &dyn Fn(&Self) -> f32| chunks.clone().map(|sums| f64::from(pick(sums))).sum::<f64>() as f32;
-        let mut total = zero_convolution();
-        for o in 0..FEATURE_COUNT {
-            for i in 0..FEATURE_COUNT {
-                total.point[o][i] = sum(&|sums| sum_lanes(&sums.point[o][i]));
-                total.neighbour[o][i] = sum(&|sums| sum_lanes(&sums.neighbour[o][i]));
-            }
-            total.bias[o] = sum(&|sums| sum_lanes(&sums.bias[o]));
-        }
-        total
-    }
-
-    /// `point += g xᵀ`, `neighbour += g meanᵀ` for some triples, in their order. A tile of sums stays in registers while
-    /// all triples go by: to read and write every sum for every triple would cost twice the products.
-    #[inline(always)]
-    fn add<const FUSED: bool>(&mut self, triples: &[Triple]) {
-        for o in (0..FEATURE_COUNT).step_by(TILE) {
-            for i in (0..FEATURE_COUNT).step_by(TILE) {
-                add_tile::<FUSED>(&mut self.point, o, i, triples, |triple| &triple.x);
-                add_tile::<FUSED>(&mut self.neighbour, o, i, triples, |triple| &triple.mean);
-            }
-        }
-    }
-}
-
-/// Sums of a tile are this many squared; with their factors they fill sixteen registers.
-const TILE: usize = 3;
-
-/// Triples that wait until there are so many.
-const PENDING: usize = 8;
-
-/// What one vertex and group adds to a convolution's gradient.
-#[derive(Clone, Copy)]
-struct Triple {
-    g: Features,
-    x: Features,
-    mean: Features,
-}
-
-impl Triple {
-    const ZERO: Self = Self {
-        g: ZERO_FEATURES,
-        x: ZERO_FEATURES,
-        mean: ZERO_FEATURES,
-    };
-}
-
-#[inline(always)]
-fn add_tile<const FUSED: bool>(
-    sums: &mut [Features; FEATURE_COUNT],
-    o: usize,
-    i: usize,
-    triples: &[Triple],
-    factor: impl Fn(&Triple) -> &Features,
-) {
-    let mut tile: [[Lane; TILE]; TILE] = core::array::from_fn(|a| core::array::from_fn(|b| sums[o + a][i + b]));
-    for triple in triples {
-        let x = factor(triple);
-        for a in 0..TILE {
-            for b in 0..TILE {
-                add_product::<FUSED>(&mut tile[a][b], &triple.g[o + a], &x[i + b]);
-            }
-        }
-    }
-    for a in 0..TILE {
-        for b in 0..TILE {
-            sums[o + a][i + b] = tile[a][b];
-        }
-    }
-}
-
-/// Triples on their way into the sums.
-struct Pending {
-    triples: [Triple; PENDING],
-    len: usize,
-}
-
-impl Pending {
-    const NONE: Self = Self {
-        triples: [Triple::ZERO; PENDING],
-        len: 0,
-    };
-
-    #[inline(always)]
-    fn push<const FUSED: bool>(&mut self, triple: Triple, sums: &mut ConvolutionSums) {
-        self.triples[self.len] = triple;
-        self.len += 1;
-        if self.len == PENDING {
-            self.flush::<FUSED>(sums);
-        }
-    }
-
-    #[inline(always)]
-    fn flush<const FUSED: bool>(&mut self, sums: &mut ConvolutionSums) {
-        sums.add::<FUSED>(&self.triples[..self.len]);
-        self.len = 0;
-    }
-}
-
-/// What a pass needs to rebuild dL/dx and dL/dy of a block before its own layers: the error's gradient, the gradient
-/// that comes back through the residual from the level below (empty for the last level), and the block's own term.
-#[derive(Clone, Copy)]
-pub(crate) struct ResidualGradient<'a> {
-    /// dL/de. Shape: `[V][width]`.
-    pub(crate) error: &'a [Features],
-    /// dL/d(x - y) from the children. Shape: `[V][width]`, or empty.
-    pub(crate) children: &'a [Features],
-    /// Twice the factor of the block's reconstruction term.
-    pub(crate) block_factor: f32,
-    /// Shape: `[V]`.
-    pub(crate) vertex_weights: &'a [f32],
-}
-
-impl ResidualGradient<'_> {
-    /// dL/d(x - y) of the block: its own term and its children's.
-    #[inline(always)]
-    fn own(&self, index: usize, v: usize, x: &Features, y: &Features) -> Features {
-        let mut gradient = if self.children.is_empty() {
-            ZERO_FEATURES
-        } else {
-            self.children[index]
-        };
-        let factor = self.block_factor * self.vertex_weights[v];
-        for c in 0..FEATURE_COUNT {
-            for n in 0..LANE_COUNT {
-                gradient[c][n] += factor * (x[c][n] - y[c][n]);
-            }
-        }
-        gradient
-    }
-}
+use crate::network::weights::BlockWeights;
 
 wide! {
     /// Turns the error into dL/de in place: `2 factor w_v e + sum_i projection_i g_i` (projections already scaled).
-    fn differentiate_error(
+    fn differentiate_error<G>(
+        simd,
         start: usize,
         factor: f32,
         vertex_weights: &[f32],
         modes: &[f32],
         mode_count: usize,
-        projections: &[Lane],
+        projections: &[G],
         group_count: usize,
-        error: &mut [Features],
+        error: &mut [Features<G>],
     ) {
-        for (index, e) in error.iter_mut().enumerate() {
-            let (v, p) = (start + index / group_count, index % group_count);
-            for c in 0..FEATURE_COUNT {
-                let mut gradient = e[c].map(|value| factor * vertex_weights[v] * value);
-                let mode = &modes[(v * FEATURE_COUNT + c) * mode_count..][..mode_count];
-                for (projection, &g) in projections[p * mode_count..(p + 1) * mode_count].iter().zip(mode) {
-                    add_scaled::<FUSED>(&mut gradient, g, projection);
+        for (i, error) in error.chunks_exact_mut(group_count).enumerate() {
+            let v = start + i;
+            for (p, e) in error.iter_mut().enumerate() {
+                for c in 0..FEATURE_COUNT {
+                    let mut gradient = simd.mul(simd.splat(factor * vertex_weights[v]), simd.load(&e[c]));
+                    let mode = &modes[(v * FEATURE_COUNT + c) * mode_count..][..mode_count];
+                    for (projection, &g) in projections[p * mode_count..(p + 1) * mode_count].iter().zip(mode) {
+                        gradient = simd.mul_add(simd.splat(g), simd.load(projection), gradient);
+                    }
+                    e[c] = simd.store(gradient);
                 }
-                e[c] = gradient;
             }
+        }
+    }
+}
+
+/// What goes back through a block's input to the masks and the residual of its parent. Mutable slices begin at the
+/// chunk; both are empty where the block has no parent.
+pub(crate) struct SourceGradient<'a, G> {
+    /// dL/d(x - y) of the parents, less what other passes add. Shape: `[parents][V][groups]`.
+    pub(crate) residuals: Vec<&'a mut [Features<G>]>,
+    /// dL/dmask. Shape: `[V][blocks]`.
+    pub(crate) masks: &'a mut [f32],
+}
+
+impl<G> SourceGradient<'_, G> {
+    /// Adds `gradient`, dL/dx of block `b` at the chunk's vertex `i`, and to `product` its part in the mask's gradient.
+    #[inline(always)]
+    fn add<S: Simd<G>>(
+        &mut self,
+        simd: S,
+        source: Source<'_, G>,
+        start: usize,
+        i: usize,
+        b: usize,
+        p: usize,
+        gradient: &Registers<S, G>,
+        product: &mut S::V,
+    ) {
+        let (v, parent) = (start + i, b / source.child_count);
+        let sum = &mut self.residuals[parent][i * source.group_count + p];
+        let residual = &source.residual(v, parent)[p];
+        let mask = simd.splat(source.mask(v, b));
+        for c in 0..FEATURE_COUNT {
+            sum[c] = simd.store(simd.mul_add(mask, gradient[c], simd.load(&sum[c])));
+            *product = simd.mul_add(gradient[c], simd.load(&residual[c]), *product);
         }
     }
 }
 
 wide! {
-    /// Back through the decoder's tanh: adds to dL/dz, turns `hat` into its own gradient, sums the bias.
-    /// `latents_transposed`: `[shape][width]` lanes of k.
-    fn decode_back(
+    /// Back through the decoder's tanh: adds to dL/dz and to dL/dhat; answers the bias's gradient of each block. What the
+    /// block's own term asks of its input goes to `source_gradient`. `residual`: x - y of the blocks. `error_gradient`:
+    /// dL/de, shape `[V][groups]`. `children`: dL/d(x - y) from the level below, or empty. `transposed`: latents,
+    /// `[blocks][shapes][width]` lanes of k. `block_factor`: twice the factor of the reconstruction terms.
+    fn decode_back<G>(
+        simd,
         start: usize,
-        x: &[Features],
-        output: &[Features],
-        residual: ResidualGradient<'_>,
-        component_count: usize,
-        latents_transposed: &[Lane],
-        rest: &[f32; FEATURE_COUNT],
-        group_count: usize,
-        hat: &mut [Features],
-        latent_gradient: &mut [Lane],
-        sums: &mut ConvolutionSums,
-    ) {
-        let width = component_count.div_ceil(LANE_COUNT);
-        let mut gradients = vec![ZERO_FEATURES; group_count];
-        for i in 0..hat.len() / width {
-            let v = start + i;
-            for (p, gradient) in gradients.iter_mut().enumerate() {
-                let index = v * group_count + p;
-                let y = &output[index];
-                let own = residual.own(index, v, &x[index], y);
-                for c in 0..FEATURE_COUNT {
-                    let slope_at_rest = 1.0 - rest[c] * rest[c];
-                    for n in 0..LANE_COUNT {
-                        let t = y[c][n] + rest[c];
-                        let towards_output = -(residual.error[index][c][n] + own[c][n]);
-                        gradient[c][n] = towards_output * (1.0 - t * t);
-                        sums.bias[c][n] += gradient[c][n] - towards_output * slope_at_rest;
-                    }
-                }
-                for k in 0..component_count {
-                    let row = &hat[i * width + k / LANE_COUNT];
-                    let z = &mut latent_gradient[p * component_count + k];
-                    for c in 0..FEATURE_COUNT {
-                        add_scaled::<FUSED>(z, row[c][k % LANE_COUNT], &gradient[c]);
-                    }
-                }
-            }
-            for q in 0..width {
-                hat[i * width + q] = expand::<FUSED>(&gradients, latents_transposed, width, q);
-            }
-        }
-    }
-}
-
-/// `sum over shapes of field[shape] z[shape]`, the gradient of a product with the latents, lanes of k.
-#[inline(always)]
-fn expand<const FUSED: bool>(field: &[Features], latents_transposed: &[Lane], width: usize, q: usize) -> Features {
-    let mut sum = ZERO_FEATURES;
-    for (p, values) in field.iter().enumerate() {
-        for n in 0..LANE_COUNT {
-            let z = &latents_transposed[(p * LANE_COUNT + n) * width + q];
+        source: Source<'_, G>,
+        blocks: &[BlockWeights],
+        residual: &[Features<G>],
+        error_gradient: &[Features<G>],
+        children: &[Features<G>],
+        block_factor: f32,
+        vertex_weights: &[f32],
+        hat: &[Features<Narrow>],
+        transposed: &[Narrow],
+        hat_gradient: &mut [&mut [Features<Narrow>]],
+        latent_gradient: &mut [G],
+        source_gradient: &mut SourceGradient<'_, G>,
+    ) -> Vec<[f32; FEATURE_COUNT]> {
+        let (block_count, group_count) = (blocks.len(), source.group_count);
+        let vertex_count = vertex_weights.len();
+        let width = hat.len() / (vertex_count * block_count);
+        let component_count = latent_gradient.len() / (block_count * group_count);
+        let has_parent = !source_gradient.residuals.is_empty();
+        let mut gradients = vec![[G::ZERO; FEATURE_COUNT]; group_count];
+        let one = simd.splat(1.0);
+        let mut biases = Vec::with_capacity(block_count);
+        for (b, block) in blocks.iter().enumerate() {
+            let parent = b / source.child_count;
+            let rest = tanh_bias(simd, &block.decoder.bias);
+            let latents = &mut latent_gradient[b * group_count * component_count..][..group_count * component_count];
+            let transposed = &transposed[b * transposed.len() / block_count..(b + 1) * transposed.len() / block_count];
+            let mut bias = zero(simd);
+            let mut slope_at_rest = rest;
             for c in 0..FEATURE_COUNT {
-                add_scaled::<FUSED>(&mut sum[c], values[c][n], z);
+                slope_at_rest[c] = simd.mul_sub(rest[c], rest[c], one);
             }
-        }
-    }
-    sum
-}
-
-wide! {
-    /// Back through the latents and the encoder: adds to dL/dC, sums the convolution, and, where the block has a parent,
-    /// turns `output` into dL/dx less the neighbours' part and `hidden` into what `gather` spreads for that part.
-    fn encode_back(
-        start: usize,
-        x: &[Features],
-        ring: &RingMean,
-        convolution: &GraphConvRecord,
-        rest: &[f32; FEATURE_COUNT],
-        components: &[Features],
-        component_count: usize,
-        latent_gradient: &[Lane],
-        latent_gradient_transposed: &[Lane],
-        residual: ResidualGradient<'_>,
-        group_count: usize,
-        has_parent: bool,
-        hidden: &mut [Features],
-        output: &mut [Features],
-        component_gradient: &mut [Features],
-        sums: &mut ConvolutionSums,
-    ) {
-        let width = component_count.div_ceil(LANE_COUNT);
-        let mut moved = vec![ZERO_FEATURES; group_count];
-        let mut pending = Pending::NONE;
-        for i in 0..hidden.len() / group_count {
-            let v = start + i;
-            for p in 0..group_count {
-                let index = v * group_count + p;
-                let mut gradient = ZERO_FEATURES;
-                for k in 0..component_count {
-                    let row = &components[v * width + k / LANE_COUNT];
-                    let z = &latent_gradient[p * component_count + k];
+            for (i, hat_gradient) in hat_gradient[b].chunks_exact_mut(width).enumerate() {
+                let v = start + i;
+                let hat = &hat[(b * vertex_count + v) * width..][..width];
+                let factor = block_factor * vertex_weights[v];
+                let mut product = simd.splat(0.0);
+                for (p, z) in latents.chunks_exact_mut(component_count).enumerate() {
+                    let at = (b * vertex_count + v) * group_count + p;
+                    let x = scaled(simd, source.mask(v, b), &source.residual(v, parent)[p]);
+                    let residual = &residual[at];
+                    let mut own = scaled(simd, factor, residual);
+                    if let Some(children) = children.get(at) {
+                        for c in 0..FEATURE_COUNT {
+                            own[c] = simd.add(own[c], simd.load(&children[c]));
+                        }
+                    }
+                    let error = &error_gradient[v * group_count + p];
+                    let mut gradient = zero(simd);
                     for c in 0..FEATURE_COUNT {
-                        add_scaled::<FUSED>(&mut gradient[c], row[c][k % LANE_COUNT], z);
+                        let t = simd.add(simd.sub(x[c], simd.load(&residual[c])), rest[c]);
+                        let from_output = simd.add(simd.load(&error[c]), own[c]);
+                        // t² - 1 and not its negative: dL/dy is -(dL/de + dL/d(x - y)).
+                        gradient[c] = simd.mul(from_output, simd.sub(simd.mul(t, t), one));
+                        bias[c] = simd.add(bias[c], simd.mul_add(from_output, slope_at_rest[c], gradient[c]));
+                    }
+                    add_projection(simd, z, hat, &gradient);
+                    store(simd, &gradient, &mut gradients[p]);
+                    if has_parent {
+                        source_gradient.add(simd, source, start, i, b, p, &own, &mut product);
                     }
                 }
-                let t = &mut hidden[i * group_count + p];
-                for c in 0..FEATURE_COUNT {
-                    let slope_at_rest = 1.0 - rest[c] * rest[c];
-                    let (value, towards_hidden) = (t[c], gradient[c]);
-                    let mut slope = ZERO_LANE;
-                    for n in 0..LANE_COUNT {
-                        slope[n] = 1.0 - value[n] * value[n];
-                    }
-                    for n in 0..LANE_COUNT {
-                        moved[p][c][n] = value[n] - rest[c];
-                    }
-                    for n in 0..LANE_COUNT {
-                        gradient[c][n] = towards_hidden[n] * slope[n];
-                    }
-                    for n in 0..LANE_COUNT {
-                        sums.bias[c][n] += gradient[c][n] - towards_hidden[n] * slope_at_rest;
-                    }
-                }
-                let mean = ring_mean(ring, Field { values: x, width: group_count, group: p }, v);
-                pending.push::<FUSED>(Triple { g: gradient, x: x[index], mean }, sums);
                 if has_parent {
-                    *t = ZERO_FEATURES;
-                    add_transposed::<FUSED>(t, &convolution.neighbour, &gradient);
-                    let y = &mut output[i * group_count + p];
-                    let mut towards_input = residual.own(index, v, &x[index], y);
-                    add_transposed::<FUSED>(&mut towards_input, &convolution.point, &gradient);
-                    *y = towards_input;
+                    source_gradient.masks[i * block_count + b] += sum_lanes(simd.store(product));
                 }
+                expand(simd.narrow(), &gradients, transposed, hat_gradient);
             }
-            for q in 0..width {
-                let own = expand::<FUSED>(&moved, latent_gradient_transposed, width, q);
-                let sum = &mut component_gradient[i * width + q];
-                for c in 0..FEATURE_COUNT {
-                    for n in 0..LANE_COUNT {
-                        sum[c][n] += own[c][n];
-                    }
-                }
-            }
+            biases.push(sum_features(simd, &bias));
         }
-        pending.flush::<FUSED>(sums);
+        biases
     }
 }
 
 wide! {
-    /// Back through `convolve_components`: adds to dL/dC, sums the convolution, turns `hat_gradient` into what `gather` spreads.
-    fn convolve_components_back(
+    /// Back through the latents and the encoder's tanh: adds to dL/dC, turns `hidden` into the gradient of what the
+    /// encoder's convolution answers; answers the bias's gradient of each block.
+    fn encode_back<G>(
+        simd,
         start: usize,
-        components: &[Features],
+        group_count: usize,
+        blocks: &[BlockWeights],
+        components: &[Features<Narrow>],
+        latent_gradient: &[G],
+        transposed: &[Narrow],
+        hidden: &mut [&mut [Features<G>]],
+        component_gradient: &mut [&mut [Features<Narrow>]],
+    ) -> Vec<[f32; FEATURE_COUNT]> {
+        let block_count = blocks.len();
+        let component_count = latent_gradient.len() / (block_count * group_count);
+        let width = component_count.div_ceil(LANE_COUNT);
+        let mut moved = vec![[G::ZERO; FEATURE_COUNT]; group_count];
+        let one = simd.splat(1.0);
+        let mut biases = Vec::with_capacity(block_count);
+        for (b, block) in blocks.iter().enumerate() {
+            let rest = tanh_bias(simd, &block.encoder.bias);
+            let latents = &latent_gradient[b * group_count * component_count..][..group_count * component_count];
+            let transposed = &transposed[b * transposed.len() / block_count..(b + 1) * transposed.len() / block_count];
+            let mut bias = zero(simd);
+            let mut slope_at_rest = rest;
+            for c in 0..FEATURE_COUNT {
+                slope_at_rest[c] = simd.mul_sub(rest[c], rest[c], one);
+            }
+            let components = &components[b * components.len() / block_count..];
+            let rows = hidden[b].chunks_exact_mut(group_count);
+            let sums = component_gradient[b].chunks_exact_mut(width);
+            for (i, (hidden, sums)) in rows.zip(sums).enumerate() {
+                let rows = &components[(start + i) * width..][..width];
+                for (p, z) in latents.chunks_exact(component_count).enumerate() {
+                    let mut towards_hidden = zero(simd);
+                    add_blend(simd, &mut towards_hidden, rows, z);
+                    for c in 0..FEATURE_COUNT {
+                        let t = simd.load(&hidden[p][c]);
+                        let gradient = simd.mul(towards_hidden[c], simd.mul_sub(t, t, one));
+                        moved[p][c] = simd.store(simd.sub(t, rest[c]));
+                        let without_rest = simd.mul_sub(towards_hidden[c], slope_at_rest[c], gradient);
+                        bias[c] = simd.add(bias[c], without_rest);
+                        hidden[p][c] = simd.store(gradient);
+                    }
+                }
+                expand(simd.narrow(), &moved, transposed, sums);
+            }
+            biases.push(sum_features(simd, &bias));
+        }
+        biases
+    }
+}
+
+wide! {
+    /// Back through the encoder's convolution, `gradient` being that of what it answers: its own gradient for each block,
+    /// and dL/dx to `source_gradient`.
+    fn convolve_back<G>(
+        simd,
+        start: usize,
+        source: Source<'_, G>,
+        ring: &RingMean,
+        blocks: &[BlockWeights],
+        gradient: &[Features<G>],
+        chunk_len: usize,
+        source_gradient: &mut SourceGradient<'_, G>,
+    ) -> Vec<GraphConvRecord> {
+        let (block_count, group_count) = (blocks.len(), source.group_count);
+        let has_parent = !source_gradient.residuals.is_empty();
+        let mut totals = Vec::with_capacity(block_count);
+        for (b, block) in blocks.iter().enumerate() {
+            let (convolution, parent) = (&block.encoder, b / source.child_count);
+            let mut sums = ConvolutionSums::ZERO;
+            let gradient = &gradient[b * gradient.len() / block_count..];
+            for i in 0..chunk_len {
+                let v = start + i;
+                let mut product = simd.splat(0.0);
+                for p in 0..group_count {
+                    let at = |v: usize| &gradient[v * group_count + p];
+                    let mut gathered = zero(simd);
+                    for &j in ring.transposed_ring(v) {
+                        add_scaled(simd, &mut gathered, ring.inverse_degree[j as usize], at(j as usize));
+                    }
+                    let x = scaled(simd, source.mask(v, b), &source.residual(v, parent)[p]);
+                    sums.push(simd, &load(simd, at(v)), &gathered, &x);
+                    if has_parent {
+                        let mut towards_input = zero(simd);
+                        add_transposed(simd, &mut towards_input, &convolution.point, &load(simd, at(v)));
+                        add_transposed(simd, &mut towards_input, &convolution.neighbour, &gathered);
+                        source_gradient.add(simd, source, start, i, b, p, &towards_input, &mut product);
+                    }
+                }
+                if has_parent {
+                    source_gradient.masks[i * block_count + b] += sum_lanes(simd.store(product));
+                }
+            }
+            totals.push(sums.total(simd));
+        }
+        totals
+    }
+}
+
+wide! {
+    /// Back through `convolve_components`: writes dL/dC, answers the convolution's gradient of each block.
+    fn convolve_components_back<G>(
+        simd,
+        start: usize,
+        components: &[Features<G>],
         width: usize,
         ring: &RingMean,
-        convolution: &GraphConvRecord,
-        hat_gradient: &mut [Features],
-        component_gradient: &mut [Features],
-        sums: &mut ConvolutionSums,
-    ) {
-        let mut pending = Pending::NONE;
-        for (i, gradient) in hat_gradient.iter_mut().enumerate() {
-            let v = start + i / width;
-            let field = Field { values: components, width, group: i % width };
-            let triple = Triple { g: *gradient, x: *field.at(v), mean: ring_mean(ring, field, v) };
-            pending.push::<FUSED>(triple, sums);
-            add_transposed::<FUSED>(&mut component_gradient[i], &convolution.point, gradient);
-            let mut spread = ZERO_FEATURES;
-            add_transposed::<FUSED>(&mut spread, &convolution.neighbour, gradient);
-            *gradient = spread;
-        }
-        pending.flush::<FUSED>(sums);
-    }
-}
-
-wide! {
-    /// The transpose of the ring mean: `sum_v += spread_j / degree_j` over all j whose ring holds v.
-    fn gather(start: usize, spread: &[Features], width: usize, ring: &RingMean, sum: &mut [Features]) {
-        for (i, own) in sum.iter_mut().enumerate() {
-            let field = Field { values: spread, width, group: i % width };
-            for &j in ring.transposed_ring(start + i / width) {
-                let share = ring.inverse_degree[j as usize];
-                let other = field.at(j as usize);
-                for c in 0..FEATURE_COUNT {
-                    add_scaled::<FUSED>(&mut own[c], share, &other[c]);
+        blocks: &[BlockWeights],
+        hat_gradient: &[Features<G>],
+        component_gradient: &mut [&mut [Features<G>]],
+    ) -> Vec<GraphConvRecord> {
+        let block_len = ring.vertex_count() * width;
+        let fields = components.chunks_exact(block_len).zip(hat_gradient.chunks_exact(block_len));
+        let mut totals = Vec::with_capacity(blocks.len());
+        for ((block, (components, hat_gradient)), component_gradient) in blocks.iter().zip(fields).zip(component_gradient) {
+            let mut sums = ConvolutionSums::ZERO;
+            for (i, component_gradient) in component_gradient.iter_mut().enumerate() {
+                let (v, q) = (start + i / width, i % width);
+                let at = |v: usize| &hat_gradient[v * width + q];
+                let mut gathered = zero(simd);
+                for &j in ring.transposed_ring(v) {
+                    add_scaled(simd, &mut gathered, ring.inverse_degree[j as usize], at(j as usize));
                 }
+                let g = load(simd, at(v));
+                sums.push(simd, &g, &gathered, &load(simd, &components[v * width + q]));
+                let mut own = zero(simd);
+                add_transposed(simd, &mut own, &block.decoder.point, &g);
+                add_transposed(simd, &mut own, &block.decoder.neighbour, &gathered);
+                store(simd, &own, component_gradient);
             }
+            totals.push(sums.total(simd));
         }
+        totals
     }
 }
 
 wide! {
-    /// Back through `attend` and `attend_residual`: dL/d(x - y) from the children, and the masks' part of dL/dC.
-    fn attend_back(
+    /// Back through `attend`: adds the masks' part to dL/dC. `masks` and their gradient, `[V][blocks][K]`, begin at the
+    /// chunk too.
+    fn attend_back<G>(
+        simd,
         start: usize,
-        x: &[Features],
-        output: &[Features],
-        masks: &[Lane],
-        components: &[Features],
+        components: &[Features<G>],
+        vertex_count: usize,
+        width: usize,
         component_count: usize,
         floor: f32,
-        children: &[&[Features]],
-        group_count: usize,
-        residual_gradient: &mut [Features],
-        component_gradient: &mut [Features],
+        masks: &[f32],
+        mask_gradient: &[f32],
+        component_gradient: &mut [&mut [Features<G>]],
     ) {
-        let width = component_count.div_ceil(LANE_COUNT);
-        let mut mask_gradient = vec![0.0_f32; component_count];
-        let mut energies = vec![ZERO_LANE; width];
-        for i in 0..residual_gradient.len() / group_count {
-            let v = start + i;
-            let mask = |k: usize| masks[v * width + k / LANE_COUNT][k % LANE_COUNT];
-            let own = &mut residual_gradient[i * group_count..(i + 1) * group_count];
-            own.fill(ZERO_FEATURES);
-            for (k, child) in children.iter().enumerate() {
-                let mut product = ZERO_LANE;
-                for p in 0..group_count {
-                    let index = v * group_count + p;
-                    let gradient = &child[index];
-                    for c in 0..FEATURE_COUNT {
-                        add_scaled::<FUSED>(&mut own[p][c], mask(k), &gradient[c]);
-                        let mut residual = ZERO_LANE;
-                        for n in 0..LANE_COUNT {
-                            residual[n] = x[index][c][n] - output[index][c][n];
-                        }
-                        add_product::<FUSED>(&mut product, &gradient[c], &residual);
-                    }
-                }
-                mask_gradient[k] = sum_lanes(&product);
-            }
-            let rows = &components[v * width..(v + 1) * width];
-            let total = energy::<FUSED>(rows, &mut energies) + component_count as f32 * floor;
-            let mut mean = 0.0;
-            for k in 0..component_count {
-                mean += mask(k) * mask_gradient[k];
-            }
-            for k in 0..component_count {
-                let factor = 2.0 * (mask_gradient[k] - mean) / total;
-                let (q, lane) = (k / LANE_COUNT, k % LANE_COUNT);
+        let block_count = component_gradient.len();
+        let mut own_energies = vec![0.0; component_count];
+        let masks = masks.chunks_exact(component_count).zip(mask_gradient.chunks_exact(component_count));
+        for (at, (masks, gradient)) in masks.enumerate() {
+            let (i, b) = (at / block_count, at % block_count);
+            let rows = &components[(b * vertex_count + start + i) * width..][..width];
+            let sums = &mut component_gradient[b][i * width..(i + 1) * width];
+            let total = energies(simd, rows, &mut own_energies) + component_count as f32 * floor;
+            let mean: f32 = masks.iter().zip(gradient).map(|(mask, gradient)| mask * gradient).sum();
+            for (k, gradient) in gradient.iter().enumerate() {
+                let factor = 2.0 * (gradient - mean) / total;
+                let (q, lane) = (k / G::LEN, k % G::LEN);
                 for c in 0..FEATURE_COUNT {
-                    component_gradient[i * width + q][c][lane] += factor * rows[q][c][lane];
+                    sums[q][c].as_mut()[lane] += factor * rows[q][c].as_ref()[lane];
                 }
             }
         }

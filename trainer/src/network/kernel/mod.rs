@@ -1,23 +1,28 @@
 //! Loss and gradients of the whole stack on the CPU, by hand: an order of magnitude faster than the differentiable model
 //! in `stack`, which is its reference in tests.
 //!
-//! Why so fast: shapes lie eight to a wide register; the decoder's convolution is applied to C instead of to shapes; every
-//! pass reads its fields once; work is split into chunks of vertices of fixed size, and sums over chunks are taken in
-//! order, so the bits do not depend on the number of threads.
+//! Why so fast: shapes lie eight or sixteen to a wide register; the decoder's convolution is applied to C instead of to
+//! shapes; what a block sees is the residual above times a mask and never stored; every pass goes through all blocks of a
+//! level while a chunk of vertices is in the cache. Chunks have a fixed size and sums over chunks are taken in order, so
+//! the bits do not depend on the number of threads.
 
 mod backward;
+mod band;
 mod forward;
 mod lanes;
-mod state;
+mod layout;
+mod level;
+mod simd;
+mod sums;
 #[cfg(test)]
 mod tests;
 
-use rayon::prelude::*;
 use sinew_formats::package::FEATURE_COUNT;
 
-use self::backward::{ConvolutionSums, ResidualGradient};
-use self::lanes::{Features, LANE_COUNT, Lane, ZERO_FEATURES, ZERO_LANE};
-use self::state::{BlockState, shapes_from_lanes, shapes_into_lanes};
+use self::band::{Band, LevelView};
+use self::lanes::{Narrow, WIDE_LANE_COUNT, Wide, has_wide_lanes};
+use self::layout::shapes_from_lanes;
+use self::level::Level;
 use super::attention::Attention;
 use super::loss::{LossSettings, LossTerms, sparsity};
 use super::ring::RingMean;
@@ -29,16 +34,30 @@ const CHUNK: usize = 128;
 /// Guards the masks' division where no component of a block is present; over V (method section 2).
 pub const MASK_FLOOR: f32 = 1e-6;
 
+/// The g_i of the position term, transposed.
+struct Modes {
+    count: usize,
+    /// In the order of rows. Shape: `[V][9][count]`.
+    values: Vec<f32>,
+}
+
 /// The network bound to a mesh, with its buffers. V vertices.
 pub struct Kernel {
+    /// The mesh's vertex at each row of the fields here, neighbours close together.
+    order: Vec<u32>,
+    /// In the order of rows.
     ring: RingMean,
+    /// In the order of rows. Shape: `[V]`.
     vertex_weights: Vec<f32>,
     attention: Attention,
-    /// Modes transposed. Shape: `[V][9][I]`.
-    modes: Vec<f32>,
-    mode_count: usize,
-    levels: Vec<Vec<BlockState>>,
-    error: Vec<Features>,
+    modes: Modes,
+    /// The root's masks: it sees all. Shape: `[V]`.
+    ones: Vec<f32>,
+    levels: Vec<Level>,
+    /// As many shapes as fill wide groups, where the machine has them; the first ones.
+    wide: Band<Wide>,
+    /// All others.
+    narrow: Band<Narrow>,
 }
 
 /// What the stack makes of some shapes.
@@ -54,47 +73,57 @@ impl Kernel {
     /// `vertex_weights`: shape `[V]`, areas with mean one. `modes`: the g_i of the position term, shape `[I][V][9]`, or
     /// empty. Both must fit the ring's V.
     pub fn new(ring: RingMean, vertex_weights: &[f32], modes: &[f32], attention: Attention) -> Self {
+        let order = ring.breadth_first_order();
         let len = ring.vertex_count() * FEATURE_COUNT;
         let mode_count = modes.len() / len;
-        let mut transposed = vec![0.0; mode_count * len];
-        for (i, mode) in modes.chunks_exact(len).enumerate() {
-            mode.iter()
-                .enumerate()
-                .for_each(|(at, &value)| transposed[at * mode_count + i] = value);
+        let mut transposed = Vec::with_capacity(modes.len());
+        for &v in &order {
+            for at in v as usize * FEATURE_COUNT..(v as usize + 1) * FEATURE_COUNT {
+                transposed.extend(modes.chunks_exact(len).map(|mode| mode[at]));
+            }
         }
         Self {
-            ring,
-            vertex_weights: vertex_weights.to_vec(),
+            ring: ring.reordered(&order),
+            vertex_weights: order.iter().map(|&v| vertex_weights[v as usize]).collect(),
             attention,
-            modes: transposed,
-            mode_count,
+            modes: Modes {
+                count: mode_count,
+                values: transposed,
+            },
+            ones: vec![1.0; vertex_weights.len()],
             levels: Vec::new(),
-            error: Vec::new(),
+            wide: Band::default(),
+            narrow: Band::default(),
+            order,
         }
     }
 
     /// Latents and reconstruction of shapes `[N][V][9]`.
     pub fn reconstruct(&mut self, weights: &StackWeights, shapes: &[f32]) -> StackOutput {
-        let shape_len = weights.vertex_count * FEATURE_COUNT;
-        let shape_count = shapes.len() / shape_len;
         self.forward(weights, shapes);
-        let mut output = shapes.to_vec();
-        let error = shapes_from_lanes(&self.error, shape_count, weights.vertex_count);
-        output.iter_mut().zip(error).for_each(|(value, error)| *value -= error);
-        let latents = weights.levels.iter().zip(&self.levels).map(|(level, states)| {
-            let of_block = |state: &BlockState| {
-                let k_count = level.component_count;
-                let at = |m: usize, k: usize| state.latents[m / LANE_COUNT * k_count + k][m % LANE_COUNT];
-                (0..shape_count)
-                    .flat_map(|m| (0..k_count).map(move |k| (m, k)))
-                    .map(|(m, k)| at(m, k))
-                    .collect()
+        let mut errors = vec![0.0; shapes.len()];
+        let wide_len = self.wide.shape_count * weights.vertex_count * FEATURE_COUNT;
+        shapes_from_lanes(&self.wide.error, &self.order, &mut errors[..wide_len]);
+        shapes_from_lanes(&self.narrow.error, &self.order, &mut errors[wide_len..]);
+        let shape_count = self.wide.shape_count + self.narrow.shape_count;
+        let latents = weights.levels.iter().enumerate().map(|(l, level)| {
+            let k_count = level.component_count;
+            let of_block = |b: usize| {
+                let all = (0..shape_count).flat_map(|m| (0..k_count).map(move |k| (m, k)));
+                all.map(|(m, k)| self.latent(l, k_count, b, m, k)).collect()
             };
-            states.iter().map(of_block).collect()
+            (0..level.blocks.len()).map(of_block).collect()
         });
         StackOutput {
             latents: latents.collect(),
-            shapes: output,
+            shapes: shapes.iter().zip(errors).map(|(shape, error)| shape - error).collect(),
+        }
+    }
+
+    fn latent(&self, l: usize, component_count: usize, b: usize, m: usize, k: usize) -> f32 {
+        match m.checked_sub(self.wide.shape_count) {
+            None => self.wide.latent(l, component_count, b, m, k),
+            Some(m) => self.narrow.latent(l, component_count, b, m, k),
         }
     }
 
@@ -106,132 +135,76 @@ impl Kernel {
         outside: &[Vec<bool>],
         settings: &LossSettings,
     ) -> (LossTerms, StackWeights) {
-        let shape_count = shapes.len() / (weights.vertex_count * FEATURE_COUNT);
-        let per_shape = settings.reconstruction_weight / shape_count as f32;
-        let block_error = self.forward(weights, shapes);
-        let (total, position) = self.measure_error(
-            2.0 * per_shape * settings.total_weight,
-            2.0 * per_shape * settings.position_weight,
-            self.error.len() / weights.vertex_count,
-        );
         let mut gradient = StackWeights::zeros(weights.vertex_count, &weights.component_counts());
-        let range = self.backward(
-            weights,
-            settings,
-            2.0 * per_shape * settings.block_weight,
-            &mut gradient,
-        );
-        let terms = LossTerms {
-            block: per_shape * settings.block_weight * block_error as f32,
-            total: per_shape * settings.total_weight * total as f32,
-            position: per_shape * settings.position_weight * position as f32,
-            sparsity: sparsity(weights, outside, settings, &mut gradient),
-            range,
-        };
+        let terms = self.differentiate_into(weights, shapes, outside, settings, &mut gradient);
         (terms, gradient)
     }
 
-    /// Fills every block's state and the total error; answers the sum over blocks of the weighted squared residuals.
-    fn forward(&mut self, weights: &StackWeights, shapes: &[f32]) -> f64 {
-        let vertex_count = weights.vertex_count;
-        let group_count = (shapes.len() / (vertex_count * FEATURE_COUNT)).div_ceil(LANE_COUNT);
-        self.levels.resize_with(weights.levels.len(), Vec::new);
-        shapes_into_lanes(shapes, vertex_count, group_count, &mut self.error);
-        let floor = self.attention.floor(vertex_count);
-        let last = weights.levels.len() - 1;
-        let mut loss = 0.0;
-        for (l, level) in weights.levels.iter().enumerate() {
-            let (done, rest) = self.levels.split_at_mut(l);
-            let states = &mut rest[0];
-            states.resize_with(level.blocks.len(), BlockState::default);
-            let (ring, vertex_weights, root_input) = (&self.ring, &self.vertex_weights, &self.error);
-            let errors: Vec<f64> = states
-                .par_iter_mut()
-                .zip(&level.blocks)
-                .enumerate()
-                .map(|(b, (state, block))| {
-                    match l.checked_sub(1) {
-                        None => state.input.clone_from(root_input),
-                        Some(above) => {
-                            let parent_count = weights.levels[above].component_count;
-                            let parent = &done[above][b / parent_count];
-                            state.attend_to(parent, parent_count, b % parent_count, group_count);
-                        }
-                    }
-                    state.forward(
-                        block,
-                        level.component_count,
-                        group_count,
-                        ring,
-                        vertex_weights,
-                        (l < last).then_some(floor),
-                    )
-                })
-                .collect();
-            loss += errors.iter().sum::<f64>();
+    /// The same, into a gradient that may be used again and again; its numbers do not matter, its shape must be that of
+    /// the weights.
+    pub fn differentiate_into(
+        &mut self,
+        weights: &StackWeights,
+        shapes: &[f32],
+        outside: &[Vec<bool>],
+        settings: &LossSettings,
+        gradient: &mut StackWeights,
+    ) -> LossTerms {
+        let shape_count = shapes.len() / (weights.vertex_count * FEATURE_COUNT);
+        let per_shape = settings.reconstruction_weight / shape_count as f32;
+        let block_error = self.forward(weights, shapes);
+        let total_factor = 2.0 * per_shape * settings.total_weight;
+        let position_factor = 2.0 * per_shape * settings.position_weight;
+        let (vertex_weights, modes) = (&self.vertex_weights, &self.modes);
+        let wide = self
+            .wide
+            .measure_error(vertex_weights, modes, total_factor, position_factor);
+        let narrow = self
+            .narrow
+            .measure_error(vertex_weights, modes, total_factor, position_factor);
+        let (total, position) = (wide.0 + narrow.0, wide.1 + narrow.1);
+        let block_factor = 2.0 * per_shape * settings.block_weight;
+        let range = self.backward(weights, settings, block_factor, gradient);
+        LossTerms {
+            block: per_shape * settings.block_weight * block_error as f32,
+            total: per_shape * settings.total_weight * total as f32,
+            position: per_shape * settings.position_weight * position as f32,
+            sparsity: sparsity(weights, outside, settings, gradient),
+            range,
         }
-        let levels = &self.levels;
-        self.error
-            .par_chunks_mut(CHUNK * group_count)
-            .enumerate()
-            .for_each(|(chunk, error)| {
-                for state in levels.iter().flatten() {
-                    forward::subtract(chunk * CHUNK, &state.output, group_count, error);
-                }
-            });
-        loss
     }
 
-    /// Weighted |e|² and Σ(g·e)²; then the error becomes dL/de for terms with these factors (twice the terms' own).
-    fn measure_error(&mut self, total_factor: f32, position_factor: f32, group_count: usize) -> (f64, f64) {
-        let (modes, mode_count, vertex_weights) = (&self.modes, self.mode_count, &self.vertex_weights);
-        let parts: Vec<(f32, Vec<Lane>)> = self
-            .error
-            .par_chunks(CHUNK * group_count)
-            .enumerate()
-            .map(|(chunk, error)| {
-                let mut projections = vec![ZERO_LANE; group_count * mode_count];
-                let start = chunk * CHUNK;
-                let loss = forward::measure_error(
-                    start,
-                    error,
-                    vertex_weights,
-                    modes,
-                    mode_count,
-                    group_count,
-                    &mut projections,
-                );
-                (loss, projections)
-            })
-            .collect();
-        let total = parts.iter().map(|part| f64::from(part.0)).sum();
-        let mut projections = state::add_lanes(parts.iter().map(|part| part.1.as_slice()), group_count * mode_count);
-        let position = projections
-            .as_flattened()
-            .iter()
-            .map(|&g| f64::from(g) * f64::from(g))
-            .sum();
-        projections
-            .as_flattened_mut()
-            .iter_mut()
-            .for_each(|value| *value *= position_factor);
-        self.error
-            .par_chunks_mut(CHUNK * group_count)
-            .enumerate()
-            .for_each(|(chunk, error)| {
-                let start = chunk * CHUNK;
-                backward::differentiate_error(
-                    start,
-                    total_factor,
-                    vertex_weights,
-                    modes,
-                    mode_count,
-                    &projections,
-                    group_count,
-                    error,
-                );
-            });
-        (total, position)
+    /// Fills every level and the total error; answers the sum over blocks of the weighted squared residuals.
+    fn forward(&mut self, weights: &StackWeights, shapes: &[f32]) -> f64 {
+        let (vertex_count, level_count) = (weights.vertex_count, weights.levels.len());
+        let shape_len = vertex_count * FEATURE_COUNT;
+        let group_count = if has_wide_lanes() {
+            shapes.len() / shape_len / WIDE_LANE_COUNT
+        } else {
+            0
+        };
+        let (wide, narrow) = shapes.split_at(group_count * WIDE_LANE_COUNT * shape_len);
+        self.wide.take(wide, &self.order, level_count);
+        self.narrow.take(narrow, &self.order, level_count);
+        self.levels.resize_with(level_count, Level::default);
+        let floor = self.attention.floor(vertex_count);
+        let mut loss = 0.0;
+        for (l, level) in weights.levels.iter().enumerate() {
+            let (above, rest) = self.levels.split_at_mut(l);
+            rest[0].forward(level, &self.order, &self.ring, (l + 1 < level_count).then_some(floor));
+            let view = LevelView {
+                weights: level,
+                ring: &self.ring,
+                vertex_weights: &self.vertex_weights,
+                masks: above.last().map_or(&self.ones, |above| &above.masks),
+                child_count: l
+                    .checked_sub(1)
+                    .map_or(1, |above| weights.levels[above].component_count),
+            };
+            loss += self.wide.forward(l, view, &rest[0]);
+            loss += self.narrow.forward(l, view, &rest[0]);
+        }
+        loss
     }
 
     /// From dL/de back through all blocks, deepest level first; answers the range term.
@@ -242,39 +215,64 @@ impl Kernel {
         block_factor: f32,
         gradient: &mut StackWeights,
     ) -> f32 {
-        let group_count = self.error.len() / weights.vertex_count;
         let floor = self.attention.floor(weights.vertex_count);
+        self.levels.iter_mut().for_each(Level::clear_gradient);
         let mut range = 0.0;
-        for l in (0..weights.levels.len()).rev() {
-            let level = &weights.levels[l];
-            let k_count = level.component_count;
-            let (rest, below) = self.levels.split_at_mut(l + 1);
-            let below = below.first();
-            let (ring, vertex_weights, error) = (&self.ring, &self.vertex_weights, &self.error);
-            let ranges: Vec<f32> = rest[l]
-                .par_iter_mut()
-                .zip(&level.blocks)
-                .zip(&mut gradient.levels[l].blocks)
-                .enumerate()
-                .map(|(b, ((state, block), gradient))| {
-                    state.prepare_gradient(block.components.len() / FEATURE_COUNT, k_count);
-                    if let Some(below) = below {
-                        state.attend_back(&below[b * k_count..(b + 1) * k_count], k_count, floor, group_count);
-                    }
-                    let children = core::mem::take(&mut state.residual_gradient);
-                    let residual = ResidualGradient {
-                        error,
-                        children: &children,
-                        block_factor,
-                        vertex_weights,
-                    };
-                    let cost = state.backward(block, k_count, group_count, ring, residual, l > 0, settings, gradient);
-                    state.residual_gradient = children;
-                    cost
-                })
-                .collect();
-            range += ranges.iter().sum::<f32>();
+        for (l, level) in weights.levels.iter().enumerate().rev() {
+            let (above, rest) = self.levels.split_at_mut(l);
+            let own = &mut rest[0];
+            let (masks, mask_gradient) = match above.last_mut() {
+                None => (self.ones.as_slice(), &mut [][..]),
+                Some(above) => (above.masks.as_slice(), above.mask_gradient.as_mut_slice()),
+            };
+            let view = LevelView {
+                weights: level,
+                ring: &self.ring,
+                vertex_weights: &self.vertex_weights,
+                masks,
+                child_count: l
+                    .checked_sub(1)
+                    .map_or(1, |above| weights.levels[above].component_count),
+            };
+            let is_first = self.wide.shape_count == 0;
+            self.wide.decode_back(l, view, own, mask_gradient, block_factor, true);
+            self.narrow
+                .decode_back(l, view, own, mask_gradient, block_factor, is_first);
+            own.backward(level, &self.ring, floor);
+            for b in 0..level.blocks.len() {
+                range += penalize_range(&mut self.wide, &mut self.narrow, l, level.component_count, b, settings);
+            }
+            self.wide.encode_back(l, view, own, mask_gradient);
+            self.narrow.encode_back(l, view, own, mask_gradient);
+            own.write_gradient(&self.order, &mut gradient.levels[l].blocks);
         }
         range
     }
+}
+
+/// `V(Z) = (1/K) Σ_k max(max_m |Z_mk| - θ, 0)` of one block; adds its gradient.
+fn penalize_range(
+    wide: &mut Band<Wide>,
+    narrow: &mut Band<Narrow>,
+    l: usize,
+    component_count: usize,
+    b: usize,
+    settings: &LossSettings,
+) -> f32 {
+    let factor = settings.range_weight / component_count as f32;
+    let mut total = 0.0;
+    for k in 0..component_count {
+        let (m, z) = wide.widest_latent(l, component_count, b, k);
+        let (other_m, other_z) = narrow.widest_latent(l, component_count, b, k);
+        let excess = z.abs().max(other_z.abs()) - settings.range_threshold;
+        if excess > 0.0 {
+            total += factor * excess;
+            if other_z.abs() > z.abs() {
+                *narrow.latent_gradient(l, component_count, b, other_m, k) += factor * other_z.signum();
+            } else {
+                *wide.latent_gradient(l, component_count, b, m, k) += factor * z.signum();
+            }
+        }
+    }
+    total
 }

@@ -226,11 +226,13 @@ fn doubles(numbers: &[f32]) -> Vec<f64> {
 }
 
 /// Components of each level, shapes, and how residuals are shared out.
-const CASES: [(&[usize], usize, Attention); 6] = [
+const CASES: [(&[usize], usize, Attention); 7] = [
     (&[3], 2, Attention::Components),
     (&[3, 2], 3, Attention::Components),
     (&[2, 2, 2], 3, Attention::Components),
     (&[9, 2], 11, Attention::Components),
+    // More shapes than a wide group holds.
+    (&[3, 2], 21, Attention::Components),
     (&[2, 2, 2], 3, Attention::Equal),
     (&[9, 2], 11, Attention::Equal),
 ];
