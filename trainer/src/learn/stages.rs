@@ -4,7 +4,7 @@ use core::time::Duration;
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::hold_out::{HeldOut, encoder_error};
+use super::hold_out::{HeldOut, Judge, encoder_error};
 use super::prepare::Prepared;
 use super::run_folder::{Plan, RunFolder};
 use super::{LearnError, Reporter, package};
@@ -47,10 +47,11 @@ pub(super) fn mixer(prepared: &Prepared, shapes: &[usize], settings: &MixSetting
 /// Numbers of the mixes that the start sees, far from those that batches see.
 const START_MIXES: u64 = 1 << 40;
 
-/// Number of the first mix that seeds are chosen by, and how many.
-const SEED_MIXES: (u64, usize) = (1 << 42, 12);
+/// Number of the first mix that seeds are chosen by, and how many: a dozen leave the choice to chance.
+const SEED_MIXES: (u64, usize) = (1 << 42, 48);
 
-/// The start. The closed form's faint parts are cut, and of `seed_count` seeds it is the one that plays unseen mixes best.
+/// The start. The closed form's faint parts are cut, and of `seed_count` seeds it is the one that plays unseen mixes best,
+/// by the network's encoder: how well levels share out a shape is what starts differ in, and least squares hides it.
 fn start(
     prepared: &Prepared,
     config: &TrainConfig,
@@ -74,7 +75,7 @@ fn start(
             return Ok(weights);
         }
         let basis = package::draft(prepared, config, &weights, shapes)?;
-        let error = encoder_error(&basis, prepared, config, &unseen, None)?;
+        let error = encoder_error(&basis, prepared, config, Judge::Network, &unseen, None)?;
         if best.as_ref().is_none_or(|(least, _)| error < *least) {
             best = Some((error, weights));
         }
