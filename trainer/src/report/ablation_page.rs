@@ -236,7 +236,7 @@ mod tests {
         };
         let page = AblationPage::new(&ablation);
         let text = page.text();
-        assert_eq!(text.matches("<polyline").count(), 3, "three curves");
+        assert_eq!(text.matches("<polyline").count(), 4, "four curves");
         assert!(text.contains("d2 0.1") && text.contains("4.25 / 4.25") && text.contains("57 of 60"));
         assert!(text.contains("failed: no &lt;luck&gt;") && text.contains("cut short"));
         assert_eq!(text.matches("<tr class=\"main\">").count(), 2);
