@@ -3,7 +3,6 @@
 //! packages before training, the start gives them their rows, the fit and the refinement leave those alone, and
 //! [`row_behind`] makes up for what the block's convolution has become.
 
-use core::fmt;
 use core::str::FromStr;
 use std::path::PathBuf;
 
@@ -71,7 +70,7 @@ pub enum KeepError {
         source: ReadError,
     },
     /// It is no compact package.
-    #[error("{}: {source}; components are kept from the package that `sinew train` wrote", package.display())]
+    #[error("{}: {source}", package.display())]
     Open {
         /// The file.
         package: PathBuf,
@@ -316,12 +315,6 @@ pub fn row_behind(wanted: &[f32], decoder: &GraphConvRecord, topology: &Topology
     flat.iter().all(|x| x.is_finite()).then_some(flat)
 }
 
-impl fmt::Display for KeptComponent {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}={}", self.package.display(), self.component, self.name)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -329,10 +322,17 @@ mod tests {
 
     #[test]
     fn what_to_keep_is_read_from_text() {
-        let kept = |text: &str| text.parse::<KeptComponent>().map(|kept| kept.to_string());
-        assert_eq!(kept("old.sinew:c3=brow").as_deref(), Ok("old.sinew:c3=brow"));
-        assert_eq!(kept("C:/old.sinew:c0.1").as_deref(), Ok("C:/old.sinew:c0.1=kept-c0-1"));
-        assert_eq!(kept("old.sinew:ear.0").as_deref(), Ok("old.sinew:ear.0=ear-0"));
+        let kept = |text: &str| text.parse::<KeptComponent>();
+        let expected = |package: &str, component: &str, name: &str| {
+            Ok(KeptComponent {
+                name: name.into(),
+                package: package.into(),
+                component: component.into(),
+            })
+        };
+        assert_eq!(kept("old.sinew:c3=brow"), expected("old.sinew", "c3", "brow"));
+        assert_eq!(kept("C:/old.sinew:c0.1"), expected("C:/old.sinew", "c0.1", "kept-c0-1"));
+        assert_eq!(kept("old.sinew:ear.0"), expected("old.sinew", "ear.0", "ear-0"));
         for wrong in ["old.sinew", "old.sinew:", ":c0", "old.sinew:c0=", "old.sinew:=x"] {
             assert!(kept(wrong).is_err(), "{wrong}");
         }

@@ -208,8 +208,8 @@ pub(super) fn is_region_name(name: &str) -> bool {
     is_name(name) && !is_place(name) && name.len() <= NAME_LENGTH && !name.contains('.')
 }
 
-/// Pairs for [`super::rename::new_names`]: the component at place number `root` is called `name`, and those below it `name.0` and so on.
-/// `places`: those of all components.
+/// Pairs for [`super::rename::new_names`]: component number `root` is called `name`, those below it `name.0` and so on.
+/// `places`: those of all components, from [`places`].
 pub fn with_those_below(places: &[String], root: usize, name: &str) -> Vec<(String, String)> {
     let below = format!("{}.", places[root]);
     let own = (places[root].clone(), name.to_owned());
@@ -221,14 +221,15 @@ pub fn with_those_below(places: &[String], root: usize, name: &str) -> Vec<(Stri
 }
 
 /// Places and new names of the coarse component that lives on each painted region alone, `ear`, and of what lies below it,
-/// `ear.0`. Of several it is the one that moves most vertices; a region where nothing lives gives no name. The regions are those of
-/// [`painted_labels`], of the package's mesh.
-pub fn painted_names(view: &CompactView<'_>, regions: &[PaintedRegion]) -> Vec<(String, String)> {
+/// `ear.0`. Of several it is the one that moves most vertices, those not asked that are `taken`; a region where nothing lives gives no
+/// name. The regions are those of [`painted_labels`], of the package's mesh.
+pub fn painted_names(view: &CompactView<'_>, regions: &[PaintedRegion], taken: &[usize]) -> Vec<(String, String)> {
     let places = places(view);
     let roots: Vec<usize> = view
         .blocks()
         .filter(|block| block.parent_component == NONE)
         .flat_map(|block| (0..block.component_count).map(move |i| (block.first_component + i) as usize))
+        .filter(|root| !taken.contains(root))
         .collect();
     let mut names = Vec::new();
     for region in regions {

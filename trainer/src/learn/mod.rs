@@ -1,9 +1,9 @@
 //! The whole training job: from a sequence to a compact package. Everything the command does between reading files and
 //! writing one is here, so that tests and other programs can do it too.
 //!
-//! Path of data: [`mod@review`] (which shapes are of use) -> [`prepare`] (topology, features, distances) -> choose how to mix and
-//! where to start, by held-out shapes ([`hold_out`]) -> fit, and fit again on all shapes where they are few -> [`mod@refine`] for
-//! positions -> [`package`] (extract, prune, measure).
+//! Path of data: what the user keeps of older packages, [`mod@review`] (which shapes are of use) -> [`prepare`] (topology,
+//! features, distances) -> choose how to mix and where to start, by held-out shapes ([`hold_out`]) -> fit, and fit again on
+//! all shapes where they are few -> [`mod@refine`] for positions -> [`package`] (extract, prune, measure).
 
 pub mod hold_out;
 pub mod package;
@@ -314,7 +314,7 @@ fn finish(
 ) -> Result<Learned, LearnError> {
     let all: Vec<usize> = (0..prepared.network.len()).collect();
     let mut weights = outcome.weights;
-    restore_kept(prepared, &mut weights);
+    restore_kept(prepared, config, &mut weights);
     let weights = refine::refine(prepared, config, &all, weights, reporter)?;
     reporter.stage("packaging", 1);
     let quality = Quality {
@@ -353,13 +353,19 @@ fn finish(
     })
 }
 
-/// What was kept decodes again to what it was: during the fit its row stayed, but not the convolution behind it. Refinement leaves
-/// both alone.
-fn restore_kept(prepared: &Prepared, weights: &mut StackWeights) {
+/// What was kept decodes again to what it was, but for the unit of its weight: during the fit its row stayed, but not the convolution
+/// behind it. Refinement leaves both alone.
+fn restore_kept(prepared: &Prepared, config: &TrainConfig, weights: &mut StackWeights) {
+    if prepared.kept_rows.is_empty() {
+        return;
+    }
     let root = &mut weights.levels[0].blocks[0];
     for (k, wanted) in prepared.kept_roots().zip(&prepared.kept_rows) {
         if let Some(row) = row_behind(wanted, &root.decoder, &prepared.topology) {
             root.components[k * row.len()..(k + 1) * row.len()].copy_from_slice(&row);
         }
+    }
+    if config.fit.loss.unit_rows {
+        weights.normalize_rows();
     }
 }

@@ -140,12 +140,16 @@ pub fn package(
     };
     let bytes = basis.with_records(provenance, quality, write_compact)?;
     let view = CompactView::open(&bytes)?;
-    let mut names = painted_names(&view, &config.start.painted);
+    let kept: Vec<(usize, &String)> = basis
+        .components()
+        .enumerate()
+        .filter_map(|(root, component)| Some((root, component.kept.as_ref()?)))
+        .collect();
+    let taken: Vec<usize> = kept.iter().map(|(root, _)| *root).collect();
+    let mut names = painted_names(&view, &config.start.painted, &taken);
     let places = places(&view);
-    for (root, component) in basis.components().enumerate() {
-        if let Some(name) = &component.kept {
-            names.extend(with_those_below(&places, root, name));
-        }
+    for (root, name) in kept {
+        names.extend(with_those_below(&places, root, name));
     }
     let bytes = if names.is_empty() {
         bytes

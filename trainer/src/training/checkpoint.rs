@@ -62,7 +62,8 @@ pub(super) fn identity(input: &FitInput<'_>, settings: &FitSettings, start: &Sta
         ..settings.clone()
     };
     let mut digest = IDENTITY.digest();
-    digest.update(format!("{steady:?} {:?}", start.component_counts()).as_bytes());
+    let counts = start.component_counts();
+    digest.update(format!("{steady:?} {counts:?} {:?}", input.kept_roots).as_bytes());
     digest.update(bytemuck::cast_slice(&input.topology.ring_offsets));
     digest.update(bytemuck::cast_slice(&input.topology.ring));
     for numbers in [

@@ -57,7 +57,9 @@ pub fn fit(
 ) -> Result<FitOutcome, TrainingError> {
     check(input, &start, settings)?;
     let supports = supports_of(&start);
-    let kept_rows = start.levels[0].blocks[0].components.clone();
+    let row_len = start.vertex_count * FEATURE_COUNT;
+    let kept_at = input.kept_roots.start * row_len..input.kept_roots.end * row_len;
+    let kept = (kept_at.start, start.levels[0].blocks[0].components[kept_at].to_vec());
     let identity = checkpoint::identity(input, settings, &start);
     let resumed = match checkpoints {
         Some(path) if path.exists() => Some(checkpoint::read(path, identity, &start)?),
@@ -71,9 +73,6 @@ pub fn fit(
         None => (first_state(start, settings, validate), Stepper::new()),
     };
     let supports = settings.keep_supports.then_some(supports);
-    let row_len = state.weights.vertex_count * FEATURE_COUNT;
-    let kept = input.kept_roots.start * row_len..input.kept_roots.end * row_len;
-    let kept = (kept.start, kept_rows[kept].to_vec());
     let first_step = state.step;
     let mut run = Run {
         network: Network::new(settings.engine, settings.attention, input),

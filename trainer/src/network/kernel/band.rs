@@ -82,6 +82,10 @@ impl<G: Group> Band<G> {
         shapes_into_lanes(shapes, order, &mut self.shapes);
         self.error.clone_from(&self.shapes);
         self.levels.resize_with(level_count, BandLevel::default);
+        if let Some(last) = self.levels.last_mut() {
+            // A deeper stack may have been here before.
+            last.residual_gradient.clear();
+        }
     }
 
     /// The z of shape `m`, component `k` of block `b`.

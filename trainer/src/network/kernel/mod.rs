@@ -197,9 +197,7 @@ impl Kernel {
                 ring: &self.ring,
                 vertex_weights: &self.vertex_weights,
                 masks: above.last().map_or(&self.ones, |above| &above.masks),
-                child_count: l
-                    .checked_sub(1)
-                    .map_or(1, |above| weights.levels[above].component_count),
+                child_count: child_count(weights, l),
             };
             loss += self.wide.forward(l, view, &rest[0]);
             loss += self.narrow.forward(l, view, &rest[0]);
@@ -230,9 +228,7 @@ impl Kernel {
                 ring: &self.ring,
                 vertex_weights: &self.vertex_weights,
                 masks,
-                child_count: l
-                    .checked_sub(1)
-                    .map_or(1, |above| weights.levels[above].component_count),
+                child_count: child_count(weights, l),
             };
             let is_first = self.wide.shape_count == 0;
             self.wide.decode_back(l, view, own, mask_gradient, block_factor, true);
@@ -248,6 +244,12 @@ impl Kernel {
         }
         range
     }
+}
+
+/// Blocks of level `l` under each block above.
+fn child_count(weights: &StackWeights, l: usize) -> usize {
+    l.checked_sub(1)
+        .map_or(1, |above| weights.levels[above].component_count)
 }
 
 /// `V(Z) = (1/K) Σ_k max(max_m |Z_mk| - θ, 0)` of one block; adds its gradient.

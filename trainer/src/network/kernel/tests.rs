@@ -395,6 +395,10 @@ fn buffers_do_not_carry_over() {
         case.kernel()
             .differentiate(&case.weights, &case.shapes, &case.outside, &all_terms())
     );
+    let shallow = Case::new(12, 3, &[3]);
+    let differentiate =
+        |kernel: &mut Kernel| kernel.differentiate(&shallow.weights, &shallow.shapes, &shallow.outside, &all_terms());
+    assert_eq!(differentiate(&mut used), differentiate(&mut case.kernel()));
 }
 
 #[test]
