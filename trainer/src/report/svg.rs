@@ -73,9 +73,11 @@ pub fn log_chart(lines: &[Line], x_name: &str, y_name: &str) -> String {
     }
     for i in 0..=4 {
         let x = x_low + x_range * f64::from(i) / 4.0;
+        // A long last number would leave the picture.
+        let anchor = if i == 4 { "end" } else { "middle" };
         let _ = write!(
             svg,
-            "<text class=\"tick\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
+            "<text class=\"tick\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{}</text>",
             x_of(x),
             SIZE.1 - bottom + 20.0,
             number(x)
