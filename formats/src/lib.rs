@@ -1,14 +1,10 @@
-//! Sinew's formats: the bytes that trainer and runtime agree on (`package`, no_std), and interchange with other programs
-//! (`interchange`, feature `std`).
+//! The bytes of a package, which Sinew's trainer and runtime agree on: no_std, nothing allocated to read.
 //!
-//! Path of data: `interchange` reads a mesh sequence for the trainer; the trainer writes a compact `package`, bakes it
-//! into a baked one; the runtime opens that and plays it. `FORMAT.md` says what every byte means.
+//! Path of data: the trainer writes a compact [`package`] and bakes it into a baked one; the runtime opens that and plays
+//! it. `FORMAT.md` says what every byte means.
 #![cfg_attr(not(feature = "std"), no_std)]
 
 #[cfg(feature = "alloc")]
 extern crate alloc;
 
 pub mod package;
-
-#[cfg(feature = "std")]
-pub mod interchange;

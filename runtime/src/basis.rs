@@ -2,12 +2,29 @@
 
 use core::fmt;
 
-use sinew_formats::package::{BakedBlock, BakedView, FastError, FastView, NONE, OpenError, RenderMesh, TierView};
+use sinew_formats::package::{
+    After, BakedView, BonesView, FAN_VERTICES, Faces, Index, IndexSlice, NONE, OpenError, PatchesView, Prior,
+    SolveView, SurfaceView,
+};
 
-use crate::simd::decode::{FeatureScales, Patches};
-use crate::simd::scalar::poisson::{Factor, Rings};
-use crate::simd::scalar::skin::Skin;
-use crate::simd::scalar::surface::{Around, Orders};
+use crate::bones::BonesInfo;
+use crate::simd::generic::decode::FeatureScales;
+use crate::simd::generic::normals::Around;
+use crate::workspace::TierChoice;
+
+/// Runs an expression with `$index` as the width of the indices of `$count` things.
+macro_rules! with_index {
+    ($count:expr, $index:ident => $body:expr) => {
+        if $count <= sinew_formats::package::SHORT_COUNT {
+            type $index = u16;
+            $body
+        } else {
+            type $index = u32;
+            $body
+        }
+    };
+}
+pub(crate) use with_index;
 
 /// A baked package, checked. Borrows the bytes; cheap to copy; may be shared between threads, each with its own workspace.
 #[derive(Clone, Copy)]
@@ -40,10 +57,11 @@ impl fmt::Debug for Basis<'_> {
 }
 
 impl<'a> Basis<'a> {
-    /// Opens a baked package; all heavy checks are here, and nothing after it can fail because of the package.
+    /// Opens a baked package; all heavy checks are here, and nothing after it can fail because of the package. The bytes must
+    /// start at a multiple of 16; at a multiple of 64 every tile of the factor is one cache line, and the solve is faster.
     ///
     /// # Errors
-    /// Every rule of the format has its own [`OpenError`]. The bytes must start at a multiple of 16.
+    /// Every rule of the format has its own [`OpenError`].
     pub fn open(bytes: &'a [u8]) -> Result<Self, OpenError> {
         Ok(Self {
             view: BakedView::open(bytes)?,
@@ -67,7 +85,7 @@ impl<'a> Basis<'a> {
 
     /// F.
     pub fn face_count(&self) -> usize {
-        self.view.faces().len()
+        self.view.surface().face_count()
     }
 
     /// K, which is the number of controls.
@@ -105,37 +123,48 @@ impl<'a> Basis<'a> {
         self.view.components().position(|record| record.name == name)
     }
 
-    /// Triangles. Shape: `[F]`, source order, counter-clockwise.
-    pub fn faces(&self) -> &'a [[u32; 3]] {
+    /// Triangles by source vertices, in the order of the source, counter-clockwise. Shape: `[F]`.
+    pub fn faces(&self) -> Faces<'a> {
         self.view.faces()
     }
 
-    /// What an engine draws: render vertices with texture coordinates; all empty where the package has none.
-    pub fn render_mesh(&self) -> RenderMesh<'a> {
-        self.view.render_mesh()
+    /// What an engine draws: triangles by render vertices, and their texture coordinates. The points of this surface are
+    /// slots. Without texture the render vertices are the slots.
+    pub fn surface(&self) -> SurfaceView<'a> {
+        self.view.surface()
     }
 
     /// R: vertices that an engine draws. V where the package has no texture coordinates.
     pub fn render_vertex_count(&self) -> usize {
-        match self.render_mesh().vertices.len() {
+        match self.surface().render_points.len() {
             0 => self.vertex_count(),
             count => count,
         }
     }
 
-    /// Rest shape. Shape: `[V]`, in **lanes**: the order in which the frame path runs; units of the source.
+    /// The source vertex that each render vertex stands for. Shape: `[R]`.
+    pub fn render_vertices(&self) -> impl ExactSizeIterator<Item = u32> + Clone + use<'a> {
+        let (count, vertices, points) = (
+            self.render_vertex_count(),
+            self.view.vertex_from_slot(),
+            self.surface().render_points,
+        );
+        (0..count).map(move |r| vertices.at(if points.is_empty() { r } else { points.at(r) as usize }))
+    }
+
+    /// Rest shape. Shape: `[V]`, in **slots**: the order in which the frame path runs; units of the source.
     pub fn rest_positions(&self) -> &'a [[f32; 3]] {
-        self.view.exact().rest_positions()
+        self.view.rest_positions()
     }
 
-    /// Lane of each source vertex. Shape: `[V]`.
-    pub fn lane_from_vertex(&self) -> &'a [u32] {
-        self.view.lane_from_vertex()
+    /// Slot of each source vertex. Shape: `[V]`.
+    pub fn slot_from_vertex(&self) -> IndexSlice<'a> {
+        self.view.slot_from_vertex()
     }
 
-    /// Source vertex of each lane. Shape: `[V]`.
-    pub fn vertex_from_lane(&self) -> &'a [u32] {
-        self.view.vertex_from_lane()
+    /// Source vertex of each slot. Shape: `[V]`.
+    pub fn vertex_from_slot(&self) -> IndexSlice<'a> {
+        self.view.vertex_from_slot()
     }
 
     /// Radians a network unit of log-rotation.
@@ -148,131 +177,113 @@ impl<'a> Basis<'a> {
         self.view.stretch_scale()
     }
 
-    /// How the triangles lie around the vertices.
-    pub(crate) fn around(&self) -> Around<'a> {
-        Around {
-            offsets: self.view.fan_offsets(),
-            fans: self.view.fans(),
-            vertex_from_lane: self.view.vertex_from_lane(),
+    /// Whether the package has a tier.
+    pub fn has_tier(&self, tier: TierChoice) -> bool {
+        match tier {
+            TierChoice::Exact => self.view.exact().is_some(),
+            TierChoice::Bones => self.view.bones().is_some(),
         }
     }
 
-    /// The orders of the exact tier.
-    pub(crate) fn orders(&self) -> Orders<'a> {
-        Orders {
-            solver_from_lane: self.view.exact().solver_from_lane(),
-            vertex_from_lane: self.view.vertex_from_lane(),
+    /// The nearest tier that the package has: the exact one, where it was not left out.
+    pub fn nearest_tier(&self) -> TierChoice {
+        if self.has_tier(TierChoice::Exact) {
+            TierChoice::Exact
+        } else {
+            TierChoice::Bones
         }
     }
 
-    /// Nodes of the fast tier, where the package has one.
-    pub fn fast_node_count(&self) -> Option<usize> {
-        self.view.fast().map(|fast| fast.nodes().node_count())
+    /// The bones, where the package has them.
+    pub fn bones(&self) -> Option<BonesInfo<'a>> {
+        self.view.bones().map(|bones| BonesInfo::new(*self, bones))
     }
 
-    /// How far the fast tier is from the exact one, measured when the package was baked.
-    pub fn fast_error(&self) -> Option<FastError> {
-        self.view.fast().map(|fast| fast.error())
-    }
-
-    /// The tier whose nodes are the vertices.
-    pub(crate) fn exact(&self) -> Tier<'a> {
-        Tier {
-            basis: *self,
-            nodes: self.view.exact(),
+    /// Says of another basis whether it is this one.
+    pub(crate) fn identity(&self) -> Identity {
+        let bones = self.bones_view();
+        let [bones, nodes] = bones.map_or([0; 2], |bones| [bones.rest_places.len(), bones.node_count]);
+        let counts = [
+            self.vertex_count(),
+            self.component_count(),
+            self.block_count(),
+            bones,
+            nodes,
+        ];
+        Identity {
+            content: self.id(),
+            counts,
         }
     }
 
-    /// The fast tier, where the package has one.
-    pub(crate) fn fast(&self) -> Option<Fast<'a>> {
-        self.view.fast().map(|view| Fast { basis: *self, view })
-    }
-}
-
-/// The fast tier of a basis.
-#[derive(Clone, Copy)]
-pub(crate) struct Fast<'a> {
-    basis: Basis<'a>,
-    view: FastView<'a>,
-}
-
-impl<'a> Fast<'a> {
-    /// What decode and solve read.
-    pub(crate) fn nodes(&self) -> Tier<'a> {
-        Tier {
-            basis: self.basis,
-            nodes: self.view.nodes(),
-        }
+    /// What is added to positions after the solve, by slots.
+    pub(crate) fn after(&self) -> After<'a> {
+        self.view.after()
     }
 
-    /// How the vertices follow the nodes.
-    pub(crate) fn skin(&self) -> Skin<'a> {
-        Skin {
-            rest: self.basis.rest_positions(),
-            centre: self.view.centre(),
-            nodes: self.view.skin_nodes(),
-            weights: self.view.skin_weights(),
-            vertex_from_lane: self.basis.vertex_from_lane(),
-        }
+    /// What is known of the weights.
+    pub(crate) fn prior(&self) -> Prior<'a> {
+        self.view.prior()
     }
-}
 
-/// One tier of a basis, and what all tiers share: all that blend, decode and solve read. N nodes; N = V in the exact tier.
-#[derive(Clone, Copy)]
-pub(crate) struct Tier<'a> {
-    basis: Basis<'a>,
-    nodes: TierView<'a>,
-}
+    /// Scales of component `k`'s whole numbers: for log-rotation, for stretch.
+    pub(crate) fn value_scales(&self, k: usize) -> [f32; 2] {
+        let scales = self.view.component(k).value_scales;
+        [scales.rotation, scales.stretch]
+    }
 
-impl<'a> Tier<'a> {
-    pub(crate) fn block(&self, b: usize) -> BakedBlock {
-        self.basis.view.block(b)
+    /// Bias of block `b`.
+    pub(crate) fn bias(&self, b: usize) -> [f32; 9] {
+        self.view.block(b).bias
     }
 
     /// What a network feature means.
     pub(crate) fn scales(&self) -> FeatureScales {
         FeatureScales {
-            rotation: self.basis.rotation_scale(),
-            stretch: self.basis.stretch_scale(),
+            rotation: self.rotation_scale(),
+            stretch: self.stretch_scale(),
         }
     }
 
-    /// Rest shape of the nodes. Shape: `[N]`, lanes.
-    pub(crate) fn rest_positions(&self) -> &'a [[f32; 3]] {
-        self.nodes.rest_positions()
-    }
-
-    /// Multiplies the halves of component `k`.
-    pub(crate) fn value_scale(&self, k: usize) -> f32 {
-        self.basis.view.component(k).value_scale
-    }
-
-    /// The components.
-    pub(crate) fn patches(&self) -> Patches<'a> {
-        Patches {
-            offsets: self.nodes.patch_offsets(),
-            owners: self.nodes.patch_owners(),
-            values: self.nodes.patch_values(),
+    /// How the triangles lie around the vertices.
+    pub(crate) fn around<I: Index>(&self) -> Around<'a, I> {
+        Around {
+            offsets: self.view.fan_offsets(),
+            fans: I::of(self.view.fans()).as_chunks::<FAN_VERTICES>().0,
+            vertex_from_slot: I::of(self.view.vertex_from_slot()),
         }
     }
 
-    pub(crate) fn rings(&self) -> Rings<'a> {
-        Rings {
-            offsets: self.nodes.ring_offsets(),
-            neighbours: self.nodes.ring(),
-            weights: self.nodes.ring_weights(),
-            solver_from_lane: self.nodes.solver_from_lane(),
-        }
+    /// The tier whose nodes are the vertices, where the package has it.
+    pub(crate) fn exact(&self) -> Option<Tier<'a>> {
+        self.view.exact().map(|exact| Tier {
+            rest: self.rest_positions(),
+            patches: exact.patches,
+            solve: exact.solve,
+        })
     }
 
-    pub(crate) fn factor(&self) -> Factor<'a> {
-        Factor {
-            offsets: self.nodes.tile_offsets(),
-            rows: self.nodes.tile_rows(),
-            tiles: self.nodes.tiles(),
-            inverse_diagonals: self.nodes.inverse_diagonals(),
-        }
+    /// What the frame path reads of the bones.
+    pub(crate) fn bones_view(&self) -> Option<BonesView<'a>> {
+        self.view.bones()
     }
+}
+
+/// What two bases that play the same have in common. The counts make sure that buffers fit even where somebody made two
+/// packages of one id.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Identity {
+    content: [u8; 16],
+    counts: [usize; 5],
+}
+
+/// The exact tier of a basis: all that decode and solve read.
+#[derive(Clone, Copy)]
+pub(crate) struct Tier<'a> {
+    /// Rest shape. Shape: `[V]`, slots.
+    pub(crate) rest: &'a [[f32; 3]],
+    pub(crate) patches: PatchesView<'a>,
+    pub(crate) solve: SolveView<'a>,
 }
 
 #[cfg(test)]

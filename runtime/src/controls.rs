@@ -56,6 +56,17 @@ impl<'c> Controls<'c> {
         Ok(taken)
     }
 
+    /// Sets a control by the share of its way from the lower stop, 0, to the upper one, 1, clamped to them: what a knob or a
+    /// slider says. Returns the weight it took.
+    ///
+    /// # Errors
+    /// Those of [`Controls::set`].
+    pub fn set_share(&mut self, component: usize, share: f32) -> Result<f32, ControlError> {
+        self.check(component, share)?;
+        let range = self.basis.component(component);
+        self.set(component, at_share(range.minimum, range.maximum, share))
+    }
+
     /// Sets a control beyond its stops: for fitting, which may leave the range seen in training.
     ///
     /// # Errors
@@ -93,6 +104,15 @@ impl<'c> Controls<'c> {
             return Err(ControlError::NotFinite { component });
         }
         Ok(())
+    }
+}
+
+/// The weight at a share of the way between two stops; at 1 and beyond it is the upper one, which the sum may miss by a rounding.
+fn at_share(minimum: f32, maximum: f32, share: f32) -> f32 {
+    if share >= 1.0 {
+        maximum
+    } else {
+        minimum + share * (maximum - minimum)
     }
 }
 
@@ -151,6 +171,9 @@ mod tests {
         assert_eq!(controls.set(1, 0.5 * maximum), Ok(0.5 * maximum));
         assert_eq!(controls.set_unclamped(1, 2.0 * maximum), Ok(()));
         assert_eq!(controls.weights()[1], 2.0 * maximum);
+        assert_eq!(controls.set_share(1, 0.0), Ok(minimum));
+        assert_eq!(controls.set_share(1, 0.25), Ok(minimum + 0.25 * (maximum - minimum)));
+        assert_eq!(controls.set_share(1, 1.5), Ok(maximum));
     }
 
     #[test]
@@ -175,14 +198,27 @@ mod tests {
             component_count: count,
         };
         assert_eq!(controls.set(count, 0.0), Err(missing));
+        assert_eq!(controls.set_share(count, 0.0), Err(missing));
         assert_eq!(controls.set_unclamped(count, 0.0), Err(missing));
         for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
             assert_eq!(controls.set(0, bad), Err(ControlError::NotFinite { component: 0 }));
+            assert_eq!(
+                controls.set_share(0, bad),
+                Err(ControlError::NotFinite { component: 0 })
+            );
             assert_eq!(
                 controls.set_unclamped(0, bad),
                 Err(ControlError::NotFinite { component: 0 })
             );
         }
         assert_eq!(controls.weights()[0], 0.25);
+    }
+
+    #[test]
+    fn the_whole_way_ends_at_the_stop_where_the_sum_misses_it() {
+        let (minimum, maximum) = (-1.49_f32, 1.35_f32);
+        assert_ne!(minimum + (maximum - minimum), maximum);
+        assert_eq!(at_share(minimum, maximum, 1.0), maximum);
+        assert_eq!(at_share(minimum, maximum, 0.0), minimum);
     }
 }

@@ -1,16 +1,18 @@
 //! Decode: the pose's weights to features and deformation gradients, where a weight has changed.
 
-use crate::basis::Tier;
+use sinew_formats::package::PatchesView;
+
+use crate::basis::Basis;
 use crate::simd::Kernels;
-use crate::simd::decode::{BlockRest, Decoder, Share};
-use crate::simd::lanes::Gradient;
+use crate::simd::generic::decode::{BlockRest, Decoder, Share};
+use crate::simd::generic::lanes::Gradient;
 
 /// Weights nearer to zero are zero: their products would be denormal and slow, and nobody sees them.
 const FLUSH_BELOW: f32 = 1e-6;
-/// Scaled weights nearer to zero are zero: times the largest half that the baker writes they stay below what tanh rounds
-/// off, and times the smallest they leave tanh a square that is a normal number.
-const FACTOR_START: f32 = 1.7e-11;
-/// Scaled weights end here: times the largest half they are finite, so that a blend never is infinity less infinity.
+/// Scaled weights nearer to zero are zero: times the largest whole number they stay below what tanh rounds off, and times one
+/// they leave tanh a square that is a normal number.
+const FACTOR_START: f32 = 1e-14;
+/// Scaled weights end here: times the largest whole number they are finite, so that a blend never is infinity less infinity.
 const FACTOR_END: f32 = 5e33;
 
 /// A weight as the blend uses it.
@@ -18,10 +20,27 @@ pub(crate) fn flushed(weight: f32) -> f32 {
     if weight.abs() < FLUSH_BELOW { 0.0 } else { weight }
 }
 
-/// What component `k` counts at a weight.
-pub(crate) fn factor(tier: &Tier<'_>, k: usize, weight: f32) -> f32 {
-    let scaled = (weight * tier.value_scale(k)).clamp(-FACTOR_END, FACTOR_END);
-    if scaled.abs() < FACTOR_START { 0.0 } else { scaled }
+/// Shares of a basis' components at rest. Shape: `[K]`.
+pub(crate) fn shares_at_rest(basis: &Basis<'_>, shares: &mut [Share]) {
+    for (k, share) in shares.iter_mut().enumerate() {
+        *share = Share {
+            factors: [0.0; 2],
+            scales: basis.value_scales(k),
+            changed: 0,
+        };
+    }
+}
+
+/// Brings the shares to `weights`, flushed, and marks those that are others now. Shape: both `[K]`.
+pub(crate) fn set_shares(shares: &mut [Share], weights: &[f32]) {
+    for (share, &weight) in shares.iter_mut().zip(weights) {
+        let factors = share.scales.map(|scale| {
+            let scaled = (weight * scale).clamp(-FACTOR_END, FACTOR_END);
+            if scaled.abs() < FACTOR_START { 0.0 } else { scaled }
+        });
+        share.changed = u32::from(factors != share.factors);
+        share.factors = factors;
+    }
 }
 
 /// Buffers of a pose that decode keeps from frame to frame.
@@ -30,30 +49,44 @@ pub(crate) struct Decoded<'p> {
     pub(crate) shares: &'p mut [Share],
     /// Shape: `[B]`.
     pub(crate) blocks: &'p [BlockRest],
-    /// Shape: `[N]`, lanes.
+    /// Which groups have other gradients than in the pose before. Shape: `[G]`.
+    pub(crate) touched: &'p mut [u8],
+    /// Shape: `[N]`, slots.
     pub(crate) gradients: &'p mut [Gradient],
 }
 
 impl Decoded<'_> {
     /// Brings the gradients to `weights` `[K]`, flushed. `all` where the gradients are not those of the pose before.
-    pub(crate) fn update(self, tier: &Tier<'_>, kernels: Kernels, weights: &[f32], all: bool) {
-        for (k, (share, &weight)) in self.shares.iter_mut().zip(weights).enumerate() {
-            let factor = factor(tier, k, weight);
-            let changed = u32::from(factor != share.factor);
-            *share = Share { factor, changed };
+    pub(crate) fn update(
+        self,
+        basis: &Basis<'_>,
+        patches: PatchesView<'_>,
+        kernels: Kernels,
+        weights: &[f32],
+        all: bool,
+    ) {
+        set_shares(self.shares, weights);
+        let decoder = decoder(basis, patches, self.shares, self.blocks);
+        if all {
+            self.touched.fill(1);
+        } else {
+            decoder.mark_touched(self.touched);
         }
-        let decoder = decoder(tier, self.shares, self.blocks, all);
-        kernels.decode(&decoder, self.gradients);
+        kernels.decode(&decoder, self.touched, self.gradients);
     }
 }
 
 /// What the kernels read.
-pub(crate) fn decoder<'a>(tier: &Tier<'a>, shares: &'a [Share], blocks: &'a [BlockRest], all: bool) -> Decoder<'a> {
+pub(crate) fn decoder<'a>(
+    basis: &Basis<'a>,
+    patches: PatchesView<'a>,
+    shares: &'a [Share],
+    blocks: &'a [BlockRest],
+) -> Decoder<'a> {
     Decoder {
-        patches: tier.patches(),
+        patches,
         shares,
         blocks,
-        scales: tier.scales(),
-        all,
+        scales: basis.scales(),
     }
 }

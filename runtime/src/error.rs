@@ -17,6 +17,8 @@ pub enum Buffer {
     Displacement,
     /// Features of the network, `[V]`.
     Features,
+    /// Maps of the bones, `[B]`.
+    Bones,
 }
 
 impl fmt::Display for Buffer {
@@ -26,6 +28,7 @@ impl fmt::Display for Buffer {
             Self::Normals => "normals",
             Self::Displacement => "displacement",
             Self::Features => "features",
+            Self::Bones => "bones",
         })
     }
 }
@@ -34,19 +37,21 @@ impl fmt::Display for Buffer {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FrameError {
-    /// A buffer has not one element a vertex.
+    /// A buffer has not one element a vertex, or a bone.
     WrongLength {
         /// Which one.
         buffer: Buffer,
-        /// Vertices of the basis.
+        /// Vertices, or bones, of the basis.
         expected: usize,
         /// Elements it has.
         actual: usize,
     },
     /// The workspace was made for another basis.
     ForeignWorkspace,
-    /// The job runs on the exact tier, and the workspace was made for the fast one.
+    /// The job runs on the exact tier, and the workspace was made for the bones.
     NeedsExactTier,
+    /// The job runs on the bones, and the workspace was made for the exact tier.
+    NeedsBones,
     /// The controls belong to another basis.
     ForeignControls,
     /// There is no such component.
@@ -60,6 +65,11 @@ pub enum FrameError {
     FeatureNotFinite {
         /// Vertex, source order.
         vertex: usize,
+    },
+    /// The weights are so large that a bone left f32. The output holds the rest pose and the workspace is at rest.
+    BoneNotFinite {
+        /// First such bone.
+        bone: usize,
     },
     /// The weights are so large that a position left f32. The output holds the rest shape and the workspace is at rest.
     NotFinite {
@@ -80,11 +90,16 @@ impl fmt::Display for FrameError {
             } => {
                 write!(
                     out,
-                    "`{buffer}` has {actual} elements and the basis {expected} vertices"
+                    "`{buffer}` has {actual} elements, and the basis asks for {expected}"
                 )
             }
             Self::ForeignWorkspace => write!(out, "the workspace was made for another basis; make one for this basis"),
             Self::NeedsExactTier => write!(out, "this job needs a workspace of the exact tier"),
+            Self::NeedsBones => write!(out, "this job needs a workspace of the bones; make one for that tier"),
+            Self::BoneNotFinite { bone } => write!(
+                out,
+                "bone {bone} left the range of numbers; use smaller weights (the bones are at rest)"
+            ),
             Self::ForeignControls => write!(out, "the controls belong to another basis; make some for this basis"),
             Self::NoSuchComponent {
                 component,
@@ -103,6 +118,19 @@ impl fmt::Display for FrameError {
                 )
             }
         }
+    }
+}
+
+/// Refuses a buffer of another length.
+pub(crate) fn check_length(expected: usize, buffer: Buffer, actual: usize) -> Result<(), FrameError> {
+    if actual == expected {
+        Ok(())
+    } else {
+        Err(FrameError::WrongLength {
+            buffer,
+            expected,
+            actual,
+        })
     }
 }
 
@@ -169,8 +197,10 @@ pub enum WorkspaceError {
         /// Bytes given.
         actual_bytes: usize,
     },
-    /// The package has no fast tier.
-    NoFastTier,
+    /// The package has no bones.
+    NoBones,
+    /// The package was baked without the exact tier.
+    NoExactTier,
     /// This processor lacks the instructions.
     KernelsMissing {
         /// The kernels asked for.
@@ -192,9 +222,13 @@ impl fmt::Display for WorkspaceError {
                     "the workspace needs {required_bytes} bytes here and got {actual_bytes}"
                 )
             }
-            Self::NoFastTier => write!(
+            Self::NoBones => write!(
                 out,
-                "the package has no fast tier; bake it with one, or use the exact tier"
+                "the package has no bones; bake it with `--bones 128`, or use the exact tier"
+            ),
+            Self::NoExactTier => write!(
+                out,
+                "the package was baked without the exact tier; use its bones, or bake it with the exact tier"
             ),
             Self::KernelsMissing { kernels } => {
                 write!(

@@ -1,12 +1,15 @@
 //! Frame: the steps in order, from controls to positions and normals. What has not changed is not computed again.
 
-use crate::basis::{Basis, Fast};
+use sinew_formats::package::BonesView;
+
+use crate::basis::{Basis, Tier};
+use crate::bones;
 use crate::controls::Controls;
 use crate::decode::{Decoded, flushed};
-use crate::error::{Buffer, FrameError};
-use crate::fast::{emit_skinned, map_nodes};
-use crate::normals::{check_length, write_normals};
-use crate::solve::{emit, solve};
+use crate::error::{Buffer, FrameError, check_length};
+use crate::normals::write_normals;
+use crate::positions::scatter;
+use crate::solve::{displace, substitute, update_right_hand_side};
 use crate::workspace::{TierChoice, Workspace};
 
 /// One frame: deforms the rest shape by the controls, on the tier that the workspace was made for.
@@ -38,14 +41,21 @@ impl Frame<'_> {
     /// [`FrameError::ForeignWorkspace`], [`FrameError::ForeignControls`], [`FrameError::WrongLength`].
     pub fn validate(&self, workspace: &Workspace<'_>) -> Result<(), FrameError> {
         workspace.validate(self.basis)?;
-        if self.controls.basis().id() != self.basis.id() {
+        if self.controls.basis().identity() != self.basis.identity() {
             return Err(FrameError::ForeignControls);
         }
-        check_length(self.basis, Buffer::Positions, self.positions.len())?;
+        let count = self.basis.vertex_count();
+        check_length(count, Buffer::Positions, self.positions.len())?;
         match &self.normals {
-            Some(normals) => check_length(self.basis, Buffer::Normals, normals.len()),
+            Some(normals) => check_length(count, Buffer::Normals, normals.len()),
             None => Ok(()),
         }
+    }
+
+    /// Whether the controls are others than those of the pose that `workspace` holds ([`Workspace::weights`]). If not, buffers in
+    /// which its last frame stands are still right, and [`Frame::run`] would only write them again. O(K).
+    pub fn would_change(&self, workspace: &Workspace<'_>) -> bool {
+        are_others(self.controls, workspace)
     }
 
     /// Deforms. Afterwards the workspace holds the pose: its features, and what [`crate::Tangent`] differentiates at.
@@ -55,59 +65,97 @@ impl Frame<'_> {
     /// outputs hold the rest shape and the workspace is at rest.
     pub fn run(self, workspace: &mut Workspace<'_>) -> Result<FrameOutcome, FrameError> {
         self.validate(workspace)?;
-        let weights = self.controls.weights().iter().map(|&w| flushed(w));
-        let outcome = if weights.clone().eq(workspace.weights.iter().copied()) {
-            FrameOutcome::Unchanged
-        } else {
-            workspace
-                .weights
-                .iter_mut()
-                .zip(weights)
-                .for_each(|(to, from)| *to = from);
-            let fast = fast_of(self.basis, workspace);
-            let tier = fast.map_or_else(|| self.basis.exact(), |fast| fast.nodes());
+        let outcome = take_weights(self.controls, workspace);
+        match workspace.tier() {
+            TierChoice::Exact => {
+                let tier = workspace.validate_exact(self.basis)?;
+                self.solve(&tier, workspace, outcome)
+            }
+            TierChoice::Bones => {
+                let bones = workspace.validate_bones(self.basis)?;
+                self.skin(&bones, workspace, outcome)
+            }
+        }
+    }
+
+    /// The exact tier: decode, solve, normals of the posed surface.
+    fn solve(
+        self,
+        tier: &Tier<'_>,
+        workspace: &mut Workspace<'_>,
+        outcome: FrameOutcome,
+    ) -> Result<FrameOutcome, FrameError> {
+        if outcome == FrameOutcome::Solved {
             let decoded = Decoded {
                 shares: workspace.shares,
                 blocks: workspace.blocks,
+                touched: workspace.touched,
                 gradients: workspace.gradients,
             };
-            decoded.update(
-                &tier,
-                workspace.kernels,
-                workspace.weights,
-                workspace.gradients_are_stale,
-            );
+            let all = workspace.gradients_are_stale;
+            decoded.update(self.basis, tier.patches, workspace.kernels, workspace.weights, all);
             workspace.gradients_are_stale = false;
-            solve(workspace.kernels, &tier, workspace.gradients, workspace.displacement);
-            if let Some(fast) = fast {
-                map_nodes(&fast, workspace.gradients, workspace.displacement, workspace.maps);
-            }
-            FrameOutcome::Solved
-        };
-        let (bounds, emitted) = match fast_of(self.basis, workspace) {
-            Some(fast) => {
-                let (maps, posed) = (&*workspace.maps, &mut *workspace.posed);
-                emit_skinned(workspace.kernels, &fast, maps, posed, self.positions)
-            }
-            None => emit(self.basis, workspace.displacement, workspace.posed, self.positions),
-        };
+            let (kernels, forces) = (workspace.kernels, &mut *workspace.forces);
+            update_right_hand_side(kernels, tier, workspace.gradients, workspace.touched, forces);
+            workspace.displacement.copy_from_slice(forces);
+            substitute(kernels, tier, workspace.displacement);
+            workspace.added.update(&self.basis.after(), workspace.weights);
+        }
+        displace(tier, workspace.displacement, workspace.posed);
+        workspace.added.apply(&self.basis.after(), workspace.posed);
+        let (bounds, written) = scatter(self.basis, workspace.posed, self.positions);
         workspace.bounds = bounds;
-        if emitted.is_err() {
+        if written.is_err() {
             workspace.rest();
         }
         if let Some(normals) = self.normals {
             write_normals(self.basis, workspace.kernels, workspace.posed, normals);
         }
-        emitted.map(|()| outcome)
+        written.map(|()| outcome)
+    }
+
+    /// The bones: their maps, and the vertices that follow them.
+    fn skin(
+        self,
+        bones: &BonesView<'_>,
+        workspace: &mut Workspace<'_>,
+        outcome: FrameOutcome,
+    ) -> Result<FrameOutcome, FrameError> {
+        if outcome == FrameOutcome::Solved {
+            bones::pose::update(self.basis, bones, workspace);
+        }
+        let mut normals = self.normals;
+        let skin = bones::skin::skin;
+        let (mut bounds, skinned) = skin(
+            self.basis,
+            bones,
+            workspace.maps,
+            self.positions,
+            normals.as_deref_mut(),
+        );
+        if skinned.is_err() {
+            workspace.rest();
+            (bounds, _) = skin(self.basis, bones, workspace.maps, self.positions, normals);
+        }
+        workspace.bounds = bounds;
+        skinned.map(|()| outcome)
     }
 }
 
-/// The fast tier, where the workspace plays it.
-fn fast_of<'a>(basis: &Basis<'a>, workspace: &Workspace<'_>) -> Option<Fast<'a>> {
-    match workspace.tier() {
-        TierChoice::Exact => None,
-        TierChoice::Fast => basis.fast(),
+fn are_others(controls: &Controls<'_>, workspace: &Workspace<'_>) -> bool {
+    let weights = controls.weights().iter().map(|&w| flushed(w));
+    !weights.eq(workspace.weights.iter().copied())
+}
+
+/// Gives a workspace the weights of the controls, and says whether they are others than it had.
+pub(crate) fn take_weights(controls: &Controls<'_>, workspace: &mut Workspace<'_>) -> FrameOutcome {
+    if !are_others(controls, workspace) {
+        return FrameOutcome::Unchanged;
     }
+    let weights = controls.weights().iter().map(|&w| flushed(w));
+    let pairs = workspace.weights.iter_mut().zip(weights);
+    pairs.for_each(|(to, from)| *to = from);
+    FrameOutcome::Solved
 }
 
 #[cfg(test)]
@@ -116,10 +164,10 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
+    use crate::FALLBACK_NORMAL;
     use crate::Kernels;
     use crate::WorkspaceLayout;
     use crate::fixture::{Package, memory_for, open, workspace_in};
-    use crate::simd::scalar::surface::FALLBACK_NORMAL;
 
     /// Neutral controls are exact: every step maps zero to zero.
     const REST_TOLERANCE: f32 = 0.0;
@@ -192,6 +240,12 @@ mod tests {
             (Ok(FrameOutcome::Solved), Ok(FrameOutcome::Unchanged))
         );
         assert_eq!((&first.1, &first.2), (&again.1, &again.2));
+        let mut nearly = WEIGHTS;
+        nearly[2] += 1e-6;
+        for (mut weights, is_other) in [(WEIGHTS, false), (nearly, true)] {
+            let controls = Controls::resume(&basis, &mut weights).unwrap();
+            assert_eq!(are_others(&controls, &workspace), is_other);
+        }
 
         let mut other = workspace_in(&basis, &mut two);
         frame(&basis, &[1.0; Package::COMPONENTS], &mut other).0.unwrap();
@@ -239,7 +293,7 @@ mod tests {
 
     #[test]
     fn weights_without_measure_saturate() {
-        let package = Package::small(1);
+        let package = Package::small_with_nothing_added(1);
         let basis = open(&package);
         let mut memory = memory_for(&basis);
         let mut workspace = workspace_in(&basis, &mut memory);
@@ -255,6 +309,22 @@ mod tests {
     }
 
     #[test]
+    fn what_is_added_grows_with_weights_until_the_mesh_is_lost() {
+        let package = Package::small(1);
+        let basis = open(&package);
+        let mut memory = memory_for(&basis);
+        let mut workspace = workspace_in(&basis, &mut memory);
+        let mix = &basis.after().mix[..Package::COMPONENTS];
+        let weights: Vec<f32> = mix.iter().map(|share| f32::MAX.copysign(*share)).collect();
+        let (outcome, positions, _) = frame(&basis, &weights, &mut workspace);
+        assert!(matches!(outcome, Err(FrameError::NotFinite { .. })), "{outcome:?}");
+        assert_eq!(positions, package.rest_in_source_order);
+        let (outcome, positions, _) = frame(&basis, &[0.0; Package::COMPONENTS], &mut workspace);
+        assert_eq!(outcome, Ok(FrameOutcome::Unchanged), "the workspace is at rest");
+        assert_eq!(positions, package.rest_in_source_order);
+    }
+
+    #[test]
     fn a_lost_position_gives_the_rest_mesh_and_leaves_the_workspace_usable() {
         let package = Package::small(1);
         let basis = open(&package);
@@ -262,7 +332,7 @@ mod tests {
         let mut workspace = workspace_in(&basis, &mut memory);
         let before = frame(&basis, &WEIGHTS, &mut workspace).1;
         // As a solve leaves it whose factor grows beyond f32.
-        workspace.displacement[3][1] = f32::INFINITY;
+        workspace.displacement[0][1][3] = f32::INFINITY;
         let (outcome, positions, normals) = frame(&basis, &WEIGHTS, &mut workspace);
         assert!(matches!(outcome, Err(FrameError::NotFinite { vertex }) if vertex < basis.vertex_count()));
         assert_eq!(positions, package.rest_in_source_order);
@@ -372,67 +442,13 @@ mod tests {
         assert_eq!(run(&controls, count, 0, &mut workspace), short(Buffer::Normals, 0));
     }
 
-    fn fast_workspace<'w>(basis: &Basis<'_>, memory: &'w mut [u8], kernels: Kernels) -> Workspace<'w> {
-        Workspace::for_tier(basis, TierChoice::Fast, memory, kernels).unwrap()
-    }
-
-    fn fast_memory(basis: &Basis<'_>) -> Vec<u8> {
-        let layout = WorkspaceLayout::for_tier(basis, TierChoice::Fast).unwrap();
-        vec![0xff; layout.unaligned_bytes()]
-    }
-
     #[test]
-    fn a_fast_tier_of_all_vertices_plays_like_the_exact_one() {
-        /// Roundings of a map about the middle of a mesh of size 6.
-        const TOLERANCE: f32 = 5e-6;
-        let package = Package::small_with_fast_tier(1);
+    fn jobs_of_the_exact_tier_refuse_a_workspace_of_bones() {
+        let package = Package::small_with_bones(1);
         let basis = open(&package);
-        for kernels in [Kernels::Scalar, Kernels::detect()] {
-            let (mut one, mut two) = (memory_for(&basis), fast_memory(&basis));
-            let mut exact = Workspace::with_kernels(&basis, &mut one, kernels).unwrap();
-            let mut fast = fast_workspace(&basis, &mut two, kernels);
-            let (_, expected, expected_normals) = frame(&basis, &WEIGHTS, &mut exact);
-            let (outcome, positions, normals) = frame(&basis, &WEIGHTS, &mut fast);
-            assert_eq!(outcome, Ok(FrameOutcome::Solved));
-            assert!(farthest(&positions, &expected) < TOLERANCE);
-            assert!(farthest(&normals, &expected_normals) < 10.0 * TOLERANCE);
-            assert_eq!(
-                frame(&basis, &WEIGHTS, &mut fast),
-                (Ok(FrameOutcome::Unchanged), positions, normals)
-            );
-
-            let neutral = [0.0; Package::COMPONENTS];
-            let (outcome, positions, _) = frame(&basis, &neutral, &mut fast);
-            assert_eq!(
-                (outcome, positions),
-                (Ok(FrameOutcome::Solved), package.rest_in_source_order.clone())
-            );
-        }
-    }
-
-    #[test]
-    fn overflow_in_the_fast_tier_gives_the_rest_mesh() {
-        let package = Package::small_with_fast_tier(1);
-        let basis = open(&package);
-        let mut memory = fast_memory(&basis);
-        let mut workspace = fast_workspace(&basis, &mut memory, Kernels::detect());
-        let before = frame(&basis, &WEIGHTS, &mut workspace).1;
-        for map in workspace.maps.iter_mut() {
-            map[1][1] = f32::INFINITY;
-        }
-        let (outcome, positions, _) = frame(&basis, &WEIGHTS, &mut workspace);
-        assert!(matches!(outcome, Err(FrameError::NotFinite { .. })), "{outcome:?}");
-        assert_eq!(positions, package.rest_in_source_order);
-        let (outcome, positions, _) = frame(&basis, &WEIGHTS, &mut workspace);
-        assert_eq!((outcome, positions), (Ok(FrameOutcome::Solved), before));
-    }
-
-    #[test]
-    fn jobs_of_the_exact_tier_refuse_a_workspace_of_the_fast_one() {
-        let package = Package::small_with_fast_tier(1);
-        let basis = open(&package);
-        let mut memory = fast_memory(&basis);
-        let mut workspace = fast_workspace(&basis, &mut memory, Kernels::Scalar);
+        let layout = WorkspaceLayout::for_tier(&basis, TierChoice::Bones).unwrap();
+        let mut memory = vec![0xff; layout.unaligned_bytes()];
+        let mut workspace = Workspace::for_tier(&basis, TierChoice::Bones, &mut memory, Kernels::Scalar).unwrap();
         let mut output = vec![[9.0; 3]; basis.vertex_count()];
         let tangent = crate::Tangent {
             basis: &basis,
@@ -451,6 +467,13 @@ mod tests {
             positions: &mut output,
         };
         assert_eq!(reconstruct.run(&mut workspace), Err(FrameError::NeedsExactTier));
+        let positions = vec![[0.0; 3]; basis.vertex_count()];
+        let normals = crate::Normals {
+            basis: &basis,
+            positions: &positions,
+            normals: &mut output,
+        };
+        assert_eq!(normals.run(&mut workspace), Err(FrameError::NeedsExactTier));
         assert!(output.iter().all(|p| *p == [9.0; 3]), "nothing was written");
     }
 }

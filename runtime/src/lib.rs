@@ -5,8 +5,8 @@
 //! solve (right-hand side, `L d = b`) -> positions -> [`Normals`]. [`Frame`] runs it; [`Tangent`] is its derivative along
 //! one control; [`Reconstruct`] enters it behind the network, with features of one's own.
 //!
-//! A workspace of the fast tier ([`TierChoice`]) runs the same path on a few nodes and lets the vertices follow them: for
-//! crowds and small devices.
+//! A workspace of bones ([`TierChoice`]) decodes at a few nodes only and makes a few affine maps of them: [`BoneMaps`] writes them
+//! for an engine's GPU to skin by, and stops.
 //!
 //! Around it: [`Handles`] and [`Drag`] find the weights that bring held vertices to where they are wanted; [`VertexOutput`]
 //! writes a frame as an engine's vertex buffer; [`Batch`] plays many instances on threads that the caller lends.
@@ -29,29 +29,30 @@
 // Only the kernels of one instruction set may allow it, each in a file of its own, and the batch's shared slice.
 #![deny(unsafe_code)]
 
-#[cfg(any(test, feature = "std"))]
+#[cfg(test)]
 extern crate std;
 
+mod added;
 mod basis;
+mod bones;
 // Threads need compare-and-swap.
 #[cfg(target_has_atomic = "ptr")]
 mod batch;
 mod controls;
 mod decode;
 mod error;
-mod fast;
 mod frame;
 mod handles;
-pub mod input;
 mod linearize;
+mod memory;
 mod normals;
 mod output;
+mod positions;
 mod reconstruct;
 mod simd;
 mod solve;
 #[doc(hidden)]
 pub mod steps;
-pub mod take;
 mod workspace;
 
 #[cfg(test)]
@@ -60,6 +61,7 @@ mod fixture;
 pub use basis::{Basis, Component};
 #[cfg(target_has_atomic = "ptr")]
 pub use batch::{Batch, Instance};
+pub use bones::{BoneMaps, BoneName, BoneOutput, BoneTransform, BonesInfo};
 pub use controls::Controls;
 pub use error::{Buffer, ControlError, FrameError, WorkspaceError};
 pub use frame::{Frame, FrameOutcome};
@@ -67,8 +69,9 @@ pub use handles::{Drag, DragReport, HANDLES_MAX, HandleError, Handles, HandlesLa
 pub use linearize::Tangent;
 pub use normals::Normals;
 pub use output::{Attribute, AttributeName, OutputError, UnitEncoding, VertexLayout, VertexOutput};
+pub use positions::Bounds;
 pub use reconstruct::Reconstruct;
 pub use simd::Kernels;
-pub use simd::scalar::surface::{Bounds, FALLBACK_NORMAL};
-pub use sinew_formats::package::{FEATURE_COUNT, FastError, OpenError, RenderMesh};
+pub use simd::generic::normals::FALLBACK_NORMAL;
+pub use sinew_formats::package::{BonesError, FEATURE_COUNT, Faces, IndexSlice, OpenError, PoseError, SurfaceView};
 pub use workspace::{TierChoice, Workspace, WorkspaceLayout};

@@ -1,10 +1,12 @@
 //! Linearize: how the positions move when one weight does, exactly, at the workspace's pose. For fitting weights to
 //! positions by Gauss-Newton, offline and on dragged vertices.
 
-use crate::basis::Basis;
+use sinew_formats::package::Index;
+
+use crate::basis::{Basis, with_index};
 use crate::decode::decoder;
-use crate::error::{Buffer, FrameError};
-use crate::normals::check_length;
+use crate::error::{Buffer, FrameError, check_length};
+use crate::simd::generic::solve::place;
 use crate::solve::solve;
 use crate::workspace::Workspace;
 
@@ -12,7 +14,7 @@ use crate::workspace::Workspace;
 /// a new workspace). The pose stays.
 ///
 /// `dx = (1 - tanh^2(bias + u)) C_k` on the component's support, `dT = [J_l(r) dr]x R S + R dS`, then the same linear solve
-/// as the frame's.
+/// as the frame's; and what the component adds after it.
 #[derive(Debug)]
 pub struct Tangent<'j> {
     /// The opened package.
@@ -30,7 +32,7 @@ impl Tangent<'_> {
     /// [`FrameError::ForeignWorkspace`], [`FrameError::NeedsExactTier`], [`FrameError::WrongLength`], [`FrameError::NoSuchComponent`].
     pub fn validate(&self, workspace: &Workspace<'_>) -> Result<(), FrameError> {
         workspace.validate_exact(self.basis)?;
-        check_length(self.basis, Buffer::Displacement, self.displacement.len())?;
+        check_length(self.basis.vertex_count(), Buffer::Displacement, self.displacement.len())?;
         let (component, component_count) = (self.component, self.basis.component_count());
         if component < component_count {
             Ok(())
@@ -48,23 +50,26 @@ impl Tangent<'_> {
     /// Those of [`Tangent::validate`]; [`FrameError::NotFinite`] when the derivative overflows: then the output is zero.
     pub fn run(self, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
         self.validate(workspace)?;
-        let tier = self.basis.exact();
-        let decoder = decoder(&tier, workspace.shares, workspace.blocks, true);
+        let tier = workspace.validate_exact(self.basis)?;
+        let decoder = decoder(self.basis, tier.patches, workspace.shares, workspace.blocks);
         let gradients = &mut *workspace.gradients;
         workspace.gradients_are_stale = true;
-        let scale = tier.value_scale(self.component);
-        workspace.kernels.tangents(&decoder, self.component, scale, gradients);
+        workspace.kernels.tangents(&decoder, self.component, gradients);
         let solution = &mut *workspace.solution;
         solve(workspace.kernels, &tier, gradients, solution);
-        let orders = self.basis.orders();
-        for (&solver, &v) in orders.solver_from_lane.iter().zip(orders.vertex_from_lane) {
-            let d = &solution[solver as usize];
-            if !d.iter().all(|x| x.is_finite()) {
-                self.displacement.fill([0.0; 3]);
-                return Err(FrameError::NotFinite { vertex: v as usize });
+        let (after, components) = (self.basis.after(), self.basis.component_count());
+        with_index!(tier.rest.len(), I => {
+            let (places, vertices) = (I::of(tier.solve.solver_from_slot), I::of(self.basis.vertex_from_slot()));
+            for (slot, (&solver, &v)) in places.iter().zip(vertices).enumerate() {
+                let (d, added) = (place(solution, solver), after.derivative(components, self.component, slot));
+                let sum: [f32; 3] = core::array::from_fn(|c| d[c] + added[c]);
+                if !sum.iter().all(|x| x.is_finite()) {
+                    self.displacement.fill([0.0; 3]);
+                    return Err(FrameError::NotFinite { vertex: v.at() });
+                }
+                self.displacement[v.at()] = sum;
             }
-            self.displacement[v as usize] = [d[0], d[1], d[2]];
-        }
+        });
         Ok(())
     }
 }

@@ -1,8 +1,11 @@
 //! Normals: the last step, and a job of its own for positions that come from elsewhere.
 
-use crate::basis::Basis;
-use crate::error::{Buffer, FrameError};
+use sinew_formats::package::Index;
+
+use crate::basis::{Basis, with_index};
+use crate::error::{Buffer, FrameError, check_length};
 use crate::simd::Kernels;
+use crate::simd::generic::solve::Xyz0;
 use crate::workspace::Workspace;
 
 /// Unit vertex normals of the basis' triangles, weighted by area. A vertex without area gets
@@ -21,11 +24,12 @@ impl Normals<'_> {
     /// Checks identity and lengths, O(1).
     ///
     /// # Errors
-    /// [`FrameError::ForeignWorkspace`], [`FrameError::WrongLength`].
+    /// [`FrameError::ForeignWorkspace`], [`FrameError::NeedsExactTier`], [`FrameError::WrongLength`].
     pub fn validate(&self, workspace: &Workspace<'_>) -> Result<(), FrameError> {
-        workspace.validate(self.basis)?;
-        check_length(self.basis, Buffer::Positions, self.positions.len())?;
-        check_length(self.basis, Buffer::Normals, self.normals.len())
+        // A workspace of bones has no scratch for the surface.
+        workspace.validate_exact(self.basis)?;
+        check_length(self.basis.vertex_count(), Buffer::Positions, self.positions.len())?;
+        check_length(self.basis.vertex_count(), Buffer::Normals, self.normals.len())
     }
 
     /// Computes the normals. The workspace lends its scratch; its pose stays.
@@ -34,32 +38,21 @@ impl Normals<'_> {
     /// Those of [`Normals::validate`].
     pub fn run(self, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
         self.validate(workspace)?;
-        for (posed, &v) in workspace.posed.iter_mut().zip(self.basis.vertex_from_lane()) {
-            let p = self.positions[v as usize];
-            *posed = [p[0], p[1], p[2], 0.0];
-        }
+        with_index!(workspace.posed.len(), I => {
+            let vertices = I::of(self.basis.vertex_from_slot());
+            for (posed, &v) in workspace.posed.iter_mut().zip(vertices) {
+                let [x, y, z] = self.positions[v.at()];
+                *posed = [x, y, z, 0.0];
+            }
+        });
         write_normals(self.basis, workspace.kernels, workspace.posed, self.normals);
         Ok(())
     }
 }
 
-/// Normals of positions in lanes. Shape: both `[V]`, `normals` in source order.
-pub(crate) fn write_normals(basis: &Basis<'_>, kernels: Kernels, posed: &[[f32; 4]], normals: &mut [[f32; 3]]) {
-    kernels.normals(&basis.around(), posed, normals);
-}
-
-/// Refuses a buffer that has not one element a vertex.
-pub(crate) fn check_length(basis: &Basis<'_>, buffer: Buffer, actual: usize) -> Result<(), FrameError> {
-    let expected = basis.vertex_count();
-    if actual == expected {
-        Ok(())
-    } else {
-        Err(FrameError::WrongLength {
-            buffer,
-            expected,
-            actual,
-        })
-    }
+/// Normals of positions in slots. Shape: both `[V]`, `normals` in source order.
+pub(crate) fn write_normals(basis: &Basis<'_>, kernels: Kernels, posed: &[Xyz0], normals: &mut [[f32; 3]]) {
+    with_index!(posed.len(), I => kernels.normals(&basis.around::<I>(), posed, normals));
 }
 
 #[cfg(test)]

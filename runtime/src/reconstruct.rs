@@ -2,14 +2,15 @@
 //! features and the solve lose by themselves.
 
 use crate::basis::Basis;
-use crate::error::{Buffer, FrameError};
-use crate::normals::check_length;
-use crate::solve::{emit, solve};
+use crate::error::{Buffer, FrameError, check_length};
+use crate::positions::scatter;
+use crate::solve::{displace, solve};
 use crate::workspace::Workspace;
 
 use sinew_formats::package::{FEATURE_COUNT, GROUP_NODES};
 
-/// Positions of given features. The workspace lends its scratch; its pose stays.
+/// Positions of given features, without what a package adds after the solve, which depends on weights. The workspace lends its
+/// scratch; its pose stays.
 #[derive(Debug)]
 pub struct Reconstruct<'j> {
     /// The opened package.
@@ -28,8 +29,9 @@ impl Reconstruct<'_> {
     /// [`FrameError::ForeignWorkspace`], [`FrameError::NeedsExactTier`], [`FrameError::WrongLength`], [`FrameError::FeatureNotFinite`].
     pub fn validate(&self, workspace: &Workspace<'_>) -> Result<(), FrameError> {
         workspace.validate_exact(self.basis)?;
-        check_length(self.basis, Buffer::Features, self.features.len())?;
-        check_length(self.basis, Buffer::Positions, self.positions.len())?;
+        let count = self.basis.vertex_count();
+        check_length(count, Buffer::Features, self.features.len())?;
+        check_length(count, Buffer::Positions, self.positions.len())?;
         match self.features.iter().position(|x| !x.iter().all(|c| c.is_finite())) {
             Some(vertex) => Err(FrameError::FeatureNotFinite { vertex }),
             None => Ok(()),
@@ -42,22 +44,23 @@ impl Reconstruct<'_> {
     /// Those of [`Reconstruct::validate`]; [`FrameError::NotFinite`], and then the output holds the rest shape.
     pub fn run(self, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
         self.validate(workspace)?;
-        let tier = self.basis.exact();
+        let (basis, tier) = (self.basis, workspace.validate_exact(self.basis)?);
         workspace.gradients_are_stale = true;
-        let vertices = self.basis.vertex_from_lane().chunks(GROUP_NODES);
-        for (vertices, gradients) in vertices.zip(workspace.gradients.chunks_mut(GROUP_NODES)) {
+        let mut vertices = basis.vertex_from_slot().iter();
+        for gradients in workspace.gradients.chunks_mut(GROUP_NODES) {
             let mut group = [[0.0; GROUP_NODES]; FEATURE_COUNT];
-            for (n, &v) in vertices.iter().enumerate() {
+            for (n, v) in vertices.by_ref().take(GROUP_NODES).enumerate() {
                 for c in 0..FEATURE_COUNT {
                     group[c][n] = self.features[v as usize][c];
                 }
             }
-            workspace.kernels.gradients(tier.scales(), &group, gradients);
+            workspace.kernels.gradients(basis.scales(), &group, gradients);
         }
         solve(workspace.kernels, &tier, workspace.gradients, workspace.solution);
-        let (bounds, emitted) = emit(self.basis, workspace.solution, workspace.posed, self.positions);
+        displace(&tier, workspace.solution, workspace.posed);
+        let (bounds, written) = scatter(basis, workspace.posed, self.positions);
         workspace.bounds = bounds;
-        emitted
+        written
     }
 }
 
@@ -71,7 +74,7 @@ mod tests {
 
     #[test]
     fn features_of_a_frame_reconstruct_its_positions_to_the_bit() {
-        let package = Package::small(1);
+        let package = Package::small_with_nothing_added(1);
         let basis = open(&package);
         let mut memory = memory_for(&basis);
         let mut workspace = workspace_in(&basis, &mut memory);

@@ -1,67 +1,84 @@
-//! Solve: deformation gradients to displacements, and those to positions in source order.
+//! Solve: deformation gradients to displacements, and those to positions in slots.
 
-use crate::basis::{Basis, Tier};
-use crate::error::FrameError;
-use crate::simd::lanes::Gradient;
-use crate::simd::scalar::poisson::{Block, Factor, Lane, Rings};
-use crate::simd::scalar::surface::{Bounds, scatter};
-use crate::simd::{Kernels, scalar};
-#[cfg(target_arch = "x86_64")]
-use crate::simd::{avx2, avx512};
+use sinew_formats::package::{GROUP_NODES, Index};
 
-/// Solves `L d = b(D)`. Shape: `gradients` `[N]`, lanes; `displacement` `[4 T]`, solver order, zero after the last node.
-pub(crate) fn solve(kernels: Kernels, tier: &Tier<'_>, gradients: &[Gradient], displacement: &mut [Lane]) {
-    let rest = tier.rest_positions();
-    displacement[rest.len()..].fill([0.0; 4]);
-    right_hand_side(kernels, &tier.rings(), rest, gradients, displacement);
-    substitute(kernels, &tier.factor(), displacement.as_chunks_mut().0);
+use crate::basis::{Tier, with_index};
+use crate::simd::Kernels;
+use crate::simd::generic::lanes::Gradient;
+use crate::simd::generic::solve::{Factor, Quad, Rings, Xyz0, place};
+
+/// Solves `L d = b(D)`. Shape: `gradients` `[N]`, slots; `displacement` `[T]`, solver order, zero after the last node.
+pub(crate) fn solve(kernels: Kernels, tier: &Tier<'_>, gradients: &[Gradient], displacement: &mut [Quad]) {
+    right_hand_side(kernels, tier, gradients, displacement);
+    substitute(kernels, tier, displacement);
 }
 
-/// See [`scalar::poisson::right_hand_side`].
-pub(crate) fn right_hand_side(
+/// The whole right-hand side, in the place of the solution.
+pub(crate) fn right_hand_side(kernels: Kernels, tier: &Tier<'_>, gradients: &[Gradient], b: &mut [Quad]) {
+    if let Some(last) = b.last_mut() {
+        *last = Quad::default();
+    }
+    with_index!(tier.rest.len(), I => {
+        let rings = Rings::<I>::of(&tier.solve);
+        kernels.right_hand_side(&rings, tier.rest, gradients, 0..tier.rest.len(), b);
+    });
+}
+
+/// Brings the right-hand side of the pose before to these gradients, where they or those of a neighbour are others: each row is
+/// computed as ever, so that it has the bits of the whole. Shape: `touched` `[G]`, groups whose gradients are others; afterwards
+/// those whose rows are.
+pub(crate) fn update_right_hand_side(
     kernels: Kernels,
-    rings: &Rings<'_>,
-    rest: &[[f32; 3]],
+    tier: &Tier<'_>,
     gradients: &[Gradient],
-    b: &mut [Lane],
+    touched: &mut [u8],
+    b: &mut [Quad],
 ) {
-    match kernels {
-        #[cfg(target_arch = "x86_64")]
-        Kernels::Avx2 | Kernels::Avx512 => avx2::poisson::right_hand_side(rings, rest, gradients, b),
-        _ => scalar::poisson::right_hand_side(rings, rest, gradients, b),
-    }
+    /// A group that has to be computed only because of a neighbour.
+    const BESIDE: u8 = 2;
+    let count = tier.rest.len();
+    with_index!(count, I => {
+        let rings = Rings::<I>::of(&tier.solve);
+        // Where most is touched, computing all is cheaper than asking.
+        if 2 * touched.iter().filter(|touched| **touched != 0).count() > touched.len() {
+            touched.fill(1);
+            kernels.right_hand_side(&rings, tier.rest, gradients, 0..count, b);
+            return;
+        }
+        for g in 0..touched.len() {
+            if touched[g] == 0 || touched[g] == BESIDE {
+                continue;
+            }
+            let (first, end) = (g * GROUP_NODES, count.min((g + 1) * GROUP_NODES));
+            let ring = rings.offsets[first] as usize..rings.offsets[end] as usize;
+            for &j in &rings.neighbours[ring] {
+                let beside = &mut touched[j.at() / GROUP_NODES];
+                *beside = if *beside == 0 { BESIDE } else { *beside };
+            }
+        }
+        let mut first = 0;
+        for run in touched.chunk_by(|a, b| (*a == 0) == (*b == 0)) {
+            let end = first + run.len() * GROUP_NODES;
+            if run[0] != 0 {
+                kernels.right_hand_side(&rings, tier.rest, gradients, first..end.min(count), b);
+            }
+            first = end;
+        }
+    });
 }
 
-/// See [`scalar::poisson::substitute`].
-pub(crate) fn substitute(kernels: Kernels, factor: &Factor<'_>, x: &mut [Block]) {
-    match kernels {
-        #[cfg(target_arch = "x86_64")]
-        Kernels::Avx2 => avx2::poisson::substitute(factor, x),
-        #[cfg(target_arch = "x86_64")]
-        Kernels::Avx512 => avx512::poisson::substitute(factor, x),
-        _ => scalar::poisson::substitute(factor, x),
-    }
+/// Solves in place.
+pub(crate) fn substitute(kernels: Kernels, tier: &Tier<'_>, x: &mut [Quad]) {
+    with_index!(tier.rest.len(), I => kernels.substitute(&Factor::<I>::of(&tier.solve), x));
 }
 
-/// Writes rest shape plus displacement in source order and in lanes; gives the bounding box of what it wrote.
-///
-/// Errors: [`FrameError::NotFinite`], and then the output holds the rest shape.
-pub(crate) fn emit(
-    basis: &Basis<'_>,
-    displacement: &[Lane],
-    posed: &mut [[f32; 4]],
-    positions: &mut [[f32; 3]],
-) -> (Bounds, Result<(), FrameError>) {
-    let (rest, orders) = (basis.rest_positions(), basis.orders());
-    let vertex = match scatter(rest, displacement, orders, posed, positions) {
-        Ok(bounds) => return (bounds, Ok(())),
-        Err(vertex) => vertex as usize,
-    };
-    let mut bounds = Bounds::EMPTY;
-    for ((r, posed), &v) in rest.iter().zip(posed).zip(orders.vertex_from_lane) {
-        positions[v as usize] = *r;
-        *posed = [r[0], r[1], r[2], 0.0];
-        bounds.include(r);
-    }
-    (bounds, Err(FrameError::NotFinite { vertex }))
+/// Rest shape plus displacement. Shape: `displacement` `[T]`, solver order; `posed` `[N]`, slots.
+pub(crate) fn displace(tier: &Tier<'_>, displacement: &[Quad], posed: &mut [Xyz0]) {
+    with_index!(tier.rest.len(), I => {
+        let places = I::of(tier.solve.solver_from_slot);
+        for ((r, &solver), posed) in tier.rest.iter().zip(places).zip(posed) {
+            let [x, y, z] = place(displacement, solver);
+            *posed = [r[0] + x, r[1] + y, r[2] + z, 0.0];
+        }
+    });
 }

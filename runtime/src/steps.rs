@@ -3,9 +3,8 @@
 
 use crate::basis::Basis;
 use crate::decode::Decoded;
-use crate::error::{Buffer, FrameError};
-use crate::normals::check_length;
-use crate::solve::{self, emit, substitute};
+use crate::error::{Buffer, FrameError, check_length};
+use crate::solve::{self, displace, substitute};
 use crate::workspace::Workspace;
 
 /// Blend, tanh and exponential map of all components of the pose.
@@ -13,13 +12,14 @@ use crate::workspace::Workspace;
 /// # Errors
 /// [`FrameError::ForeignWorkspace`], [`FrameError::NeedsExactTier`]; so for all steps.
 pub fn decode(basis: &Basis<'_>, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
-    workspace.validate_exact(basis)?;
+    let tier = workspace.validate_exact(basis)?;
     let decoded = Decoded {
         shares: workspace.shares,
         blocks: workspace.blocks,
+        touched: workspace.touched,
         gradients: workspace.gradients,
     };
-    decoded.update(&basis.exact(), workspace.kernels, workspace.weights, true);
+    decoded.update(basis, tier.patches, workspace.kernels, workspace.weights, true);
     Ok(())
 }
 
@@ -28,15 +28,8 @@ pub fn decode(basis: &Basis<'_>, workspace: &mut Workspace<'_>) -> Result<(), Fr
 /// # Errors
 /// Those of [`decode`].
 pub fn right_hand_side(basis: &Basis<'_>, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
-    workspace.validate_exact(basis)?;
-    let tier = basis.exact();
-    solve::right_hand_side(
-        workspace.kernels,
-        &tier.rings(),
-        tier.rest_positions(),
-        workspace.gradients,
-        workspace.solution,
-    );
+    let tier = workspace.validate_exact(basis)?;
+    solve::right_hand_side(workspace.kernels, &tier, workspace.gradients, workspace.solution);
     Ok(())
 }
 
@@ -45,13 +38,9 @@ pub fn right_hand_side(basis: &Basis<'_>, workspace: &mut Workspace<'_>) -> Resu
 /// # Errors
 /// Those of [`decode`].
 pub fn solve(basis: &Basis<'_>, workspace: &mut Workspace<'_>) -> Result<(), FrameError> {
-    workspace.validate_exact(basis)?;
-    workspace.solution[..basis.vertex_count()].fill([1.0, 1.0, 1.0, 0.0]);
-    substitute(
-        workspace.kernels,
-        &basis.exact().factor(),
-        workspace.solution.as_chunks_mut().0,
-    );
+    let tier = workspace.validate_exact(basis)?;
+    workspace.solution.fill([[1.0; 4], [1.0; 4], [1.0; 4], [0.0; 4]]);
+    substitute(workspace.kernels, &tier, workspace.solution);
     Ok(())
 }
 
@@ -60,7 +49,9 @@ pub fn solve(basis: &Basis<'_>, workspace: &mut Workspace<'_>) -> Result<(), Fra
 /// # Errors
 /// Those of [`decode`], and of a pose that left f32.
 pub fn scatter(basis: &Basis<'_>, workspace: &mut Workspace<'_>, positions: &mut [[f32; 3]]) -> Result<(), FrameError> {
-    workspace.validate_exact(basis)?;
-    check_length(basis, Buffer::Positions, positions.len())?;
-    emit(basis, workspace.displacement, workspace.posed, positions).1
+    let tier = workspace.validate_exact(basis)?;
+    check_length(basis.vertex_count(), Buffer::Positions, positions.len())?;
+    displace(&tier, workspace.displacement, workspace.posed);
+    workspace.added.apply(&basis.after(), workspace.posed);
+    crate::positions::scatter(basis, workspace.posed, positions).1
 }

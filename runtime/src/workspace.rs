@@ -2,21 +2,20 @@
 //!
 //! A workspace always holds a pose that is finite and whole: the rest pose when new, then that of the last frame.
 
-use sinew_formats::package::{FEATURE_COUNT, GROUP_NODES};
+use sinew_formats::package::{BonesView, FEATURE_COUNT, GROUP_NODES, QUAD};
 
-use crate::basis::Basis;
-use crate::decode::decoder;
-use crate::error::{Buffer, FrameError, WorkspaceError};
-use crate::normals::check_length;
+use crate::added::Added;
+use crate::basis::{Basis, Identity, Tier};
+use crate::bones::pose::Map;
+use crate::decode::{decoder, shares_at_rest};
+use crate::error::{Buffer, FrameError, WorkspaceError, check_length};
+use crate::memory::{ALIGNMENT, Carver};
+use crate::positions::Bounds;
 use crate::simd::Kernels;
-use crate::simd::decode::{BlockRest, Share};
-use crate::simd::lanes::Gradient;
-use crate::simd::scalar::poisson::{BLOCK, Lane};
-use crate::simd::scalar::skin::Map;
-use crate::simd::scalar::surface::Bounds;
-
-/// Start of every buffer: a cache line, and the widest vector register.
-pub(crate) const ALIGNMENT: usize = 64;
+use crate::simd::generic::bones::BoneLanes;
+use crate::simd::generic::decode::{BlockRest, Share};
+use crate::simd::generic::lanes::Gradient;
+use crate::simd::generic::solve::{Quad, Xyz0};
 
 /// Which tier of a package a workspace plays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
@@ -24,9 +23,9 @@ pub enum TierChoice {
     /// All vertices are solved for: what was trained.
     #[default]
     Exact,
-    /// A few nodes are solved for, and the vertices follow them: for crowds and small devices. How far it is from the exact
-    /// tier, [`Basis::fast_error`] says.
-    Fast,
+    /// A few affine maps that the vertices follow: for GPUs, crowds and small devices. How far it is from the exact tier,
+    /// [`crate::BonesInfo::error`] says.
+    Bones,
 }
 
 /// How much memory a workspace needs.
@@ -39,18 +38,27 @@ pub struct WorkspaceLayout {
 }
 
 impl WorkspaceLayout {
-    /// Layout for the exact tier of `basis`: about 96 bytes a vertex.
+    /// Layout for the nearest tier that `basis` has: the exact one, about 113 bytes a vertex, where it was not left out.
     pub fn for_basis(basis: &Basis<'_>) -> Self {
-        Sections::exact(basis).layout()
+        Self::of(basis, basis.nearest_tier())
     }
 
-    /// Layout for a tier of `basis`. The fast one takes 16 bytes a vertex and 128 a node: a third of the exact one's with a
-    /// node for every eight vertices.
+    /// Layout for a tier of `basis`. Bones take 49 bytes a node and 128 a bone, and nothing a vertex.
     ///
     /// # Errors
-    /// [`WorkspaceError::NoFastTier`].
+    /// [`WorkspaceError::NoBones`], [`WorkspaceError::NoExactTier`].
     pub fn for_tier(basis: &Basis<'_>, tier: TierChoice) -> Result<Self, WorkspaceError> {
-        Ok(Sections::of(basis, tier)?.layout())
+        check_tier(basis, tier)?;
+        Ok(Self::of(basis, tier))
+    }
+
+    fn of(basis: &Basis<'_>, tier: TierChoice) -> Self {
+        let mut carver = Carver::measuring();
+        Workspace::carve(basis, tier, Kernels::Scalar, &mut carver);
+        Self {
+            size_bytes: carver.bytes(),
+            alignment: ALIGNMENT,
+        }
     }
 
     /// Bytes that are enough wherever the memory starts.
@@ -59,84 +67,18 @@ impl WorkspaceLayout {
     }
 }
 
-/// Element counts of the buffers, in the order in which they lie in memory.
-struct Sections {
-    components: usize,
-    blocks: usize,
-    nodes: usize,
-    /// Nodes of the solve that is not the pose's: none in the fast tier.
-    solved_aside: usize,
-    /// Nodes that vertices follow: none in the exact tier.
-    maps: usize,
-    vertices: usize,
-}
-
-impl Sections {
-    fn exact(basis: &Basis<'_>) -> Self {
-        let vertices = basis.vertex_count();
-        Self {
-            components: basis.component_count(),
-            blocks: basis.block_count(),
-            nodes: vertices,
-            solved_aside: vertices,
-            maps: 0,
-            vertices,
-        }
+fn check_tier(basis: &Basis<'_>, tier: TierChoice) -> Result<(), WorkspaceError> {
+    match tier {
+        _ if basis.has_tier(tier) => Ok(()),
+        TierChoice::Exact => Err(WorkspaceError::NoExactTier),
+        TierChoice::Bones => Err(WorkspaceError::NoBones),
     }
-
-    fn of(basis: &Basis<'_>, tier: TierChoice) -> Result<Self, WorkspaceError> {
-        let exact = Self::exact(basis);
-        if tier == TierChoice::Exact {
-            return Ok(exact);
-        }
-        let nodes = basis.fast_node_count().ok_or(WorkspaceError::NoFastTier)?;
-        Ok(Self {
-            nodes,
-            solved_aside: 0,
-            maps: nodes,
-            ..exact
-        })
-    }
-
-    fn layout(&self) -> WorkspaceLayout {
-        WorkspaceLayout {
-            size_bytes: self.size_bytes(),
-            alignment: ALIGNMENT,
-        }
-    }
-
-    /// Nodes of whole blocks: the solve runs on tiles.
-    fn padded_nodes(&self) -> usize {
-        self.nodes.next_multiple_of(BLOCK)
-    }
-
-    fn padded_aside(&self) -> usize {
-        self.solved_aside.next_multiple_of(BLOCK)
-    }
-
-    /// The limits of the format keep this under a gigabyte, which fits 32 bits.
-    fn size_bytes(&self) -> usize {
-        section_bytes::<f32>(self.components)
-            + section_bytes::<Share>(self.components)
-            + section_bytes::<BlockRest>(self.blocks)
-            + section_bytes::<Gradient>(self.nodes)
-            + section_bytes::<Lane>(self.padded_nodes())
-            + section_bytes::<Lane>(self.padded_aside())
-            + section_bytes::<Map>(self.maps)
-            + section_bytes::<[f32; 4]>(self.vertices)
-    }
-}
-
-/// Bytes of `count` elements, rounded up so that the next buffer is aligned.
-pub(crate) fn section_bytes<T>(count: usize) -> usize {
-    let bytes = count.saturating_mul(size_of::<T>()).saturating_add(ALIGNMENT - 1);
-    bytes - bytes % ALIGNMENT
 }
 
 /// The buffers of the frame path. Made once; after that nothing needs memory.
 #[derive(Debug)]
 pub struct Workspace<'w> {
-    basis_id: [u8; 16],
+    basis: Identity,
     /// What the buffers are for; the basis has it.
     tier: TierChoice,
     /// What the frame path runs on; present on this machine.
@@ -145,27 +87,37 @@ pub struct Workspace<'w> {
     pub(crate) weights: &'w mut [f32],
     /// What the components count in the pose. Shape: `[K]`.
     pub(crate) shares: &'w mut [Share],
-    /// Constants of the basis and the kernels. Shape: `[B]`.
+    /// Shape: `[B]`.
     pub(crate) blocks: &'w mut [BlockRest],
-    /// `D = T - I` of the pose, or scratch. Shape: `[N]`, lanes.
+    /// `D = T - I` of the pose, or scratch. Shape: `[N]`, slots of the nodes.
     pub(crate) gradients: &'w mut [Gradient],
+    /// Scratch: the groups of nodes that a pose touches. Shape: `[G]`.
+    pub(crate) touched: &'w mut [u8],
+    /// Right-hand side of the pose. Shape: that of `displacement`.
+    pub(crate) forces: &'w mut [Quad],
     /// Whether another job has used the gradients since the last frame.
     pub(crate) gradients_are_stale: bool,
-    /// Displacement of the pose, zero after the last node. Shape: `[4 T]`, solver order.
-    pub(crate) displacement: &'w mut [Lane],
-    /// Scratch: a solve that is not the pose's. Shape: that of `displacement`; empty in the fast tier.
-    pub(crate) solution: &'w mut [Lane],
-    /// Maps of the pose. Shape: `[N]`, lanes; empty in the exact tier.
+    /// Displacement of the pose, zero after the last node. Shape: `[T]`, solver order; empty for bones.
+    pub(crate) displacement: &'w mut [Quad],
+    /// Scratch: a solve that is not the pose's. Shape: that of `displacement`.
+    pub(crate) solution: &'w mut [Quad],
+    /// Gradients of the bones. Shape: `[B]`; empty in the exact tier, as all of the bones'.
+    pub(crate) turned: &'w mut [Gradient],
+    /// Displacements of the bones. Shape: `[H]`.
+    pub(crate) displaced: &'w mut [BoneLanes],
+    /// Maps of the pose. Shape: `[B]`.
     pub(crate) maps: &'w mut [Map],
-    /// Scratch: positions for the normals. Shape: `[V]`, lanes.
-    pub(crate) posed: &'w mut [[f32; 4]],
+    /// What the pose adds after the solve.
+    pub(crate) added: Added<'w>,
+    /// Scratch: positions for the normals. Shape: `[V]`, slots; empty for bones.
+    pub(crate) posed: &'w mut [Xyz0],
     /// Box of the positions last written.
     pub(crate) bounds: Bounds,
 }
 
 impl<'w> Workspace<'w> {
-    /// Carves `memory`, sets the rest pose. Bytes beyond the layout's stay untouched. Frames run on the widest kernels of
-    /// this machine.
+    /// Carves `memory` for the nearest tier of `basis` and sets the rest pose. Bytes beyond the layout's stay untouched. Frames
+    /// run on the widest kernels of this machine.
     ///
     /// # Errors
     /// [`WorkspaceError::TooSmall`], with the size that this memory would need given where it starts.
@@ -178,13 +130,13 @@ impl<'w> Workspace<'w> {
     /// # Errors
     /// Those of [`Workspace::new`]; [`WorkspaceError::KernelsMissing`] where the processor lacks the instructions.
     pub fn with_kernels(basis: &Basis<'_>, memory: &'w mut [u8], kernels: Kernels) -> Result<Self, WorkspaceError> {
-        Self::for_tier(basis, TierChoice::Exact, memory, kernels)
+        Self::for_tier(basis, basis.nearest_tier(), memory, kernels)
     }
 
     /// The same for a tier of choice; [`WorkspaceLayout::for_tier`] says how much memory.
     ///
     /// # Errors
-    /// Those of [`Workspace::with_kernels`]; [`WorkspaceError::NoFastTier`].
+    /// Those of [`Workspace::with_kernels`]; [`WorkspaceError::NoBones`], [`WorkspaceError::NoExactTier`].
     pub fn for_tier(
         basis: &Basis<'_>,
         tier: TierChoice,
@@ -194,45 +146,52 @@ impl<'w> Workspace<'w> {
         if !kernels.run_here() {
             return Err(WorkspaceError::KernelsMissing { kernels });
         }
-        let sections = Sections::of(basis, tier)?;
-        let skipped = memory.as_ptr().align_offset(ALIGNMENT);
-        let required_bytes = skipped.saturating_add(sections.size_bytes());
-        if memory.len() < required_bytes {
-            return Err(WorkspaceError::TooSmall {
-                required_bytes,
-                actual_bytes: memory.len(),
-            });
+        let layout = WorkspaceLayout::for_tier(basis, tier)?;
+        let mut carver = Carver::carving(memory, layout.size_bytes)?;
+        let workspace = Self::carve(basis, tier, kernels, &mut carver);
+        for (b, block) in workspace.blocks.iter_mut().enumerate() {
+            block.bias = basis.bias(b);
         }
-        let memory = &mut memory[skipped..required_bytes];
-        memory.fill(0);
-        let (weights, memory) = carve(memory, sections.components);
-        let (shares, memory) = carve(memory, sections.components);
-        let (blocks, memory) = carve::<BlockRest>(memory, sections.blocks);
-        let (gradients, memory) = carve(memory, sections.nodes);
-        let (displacement, memory) = carve(memory, sections.padded_nodes());
-        let (solution, memory) = carve(memory, sections.padded_aside());
-        let (maps, memory) = carve(memory, sections.maps);
-        let (posed, _) = carve(memory, sections.vertices);
-        for (b, block) in blocks.iter_mut().enumerate() {
-            block.bias = basis.exact().block(b).bias;
-        }
-        kernels.rest_activations(blocks);
-        let basis_id = basis.id();
-        Ok(Self {
-            basis_id,
+        kernels.rest_activations(workspace.blocks);
+        shares_at_rest(basis, workspace.shares);
+        Ok(workspace)
+    }
+
+    /// The sections in the order in which they lie in memory; all are zero. The limits of the format keep them under a
+    /// gigabyte, which fits 32 bits.
+    fn carve(basis: &Basis<'_>, tier: TierChoice, kernels: Kernels, carver: &mut Carver<'w>) -> Self {
+        let (vertices, components) = (basis.vertex_count(), basis.component_count());
+        let (solved, nodes, bones) = match tier {
+            TierChoice::Exact => (vertices, vertices, 0),
+            TierChoice::Bones => {
+                let bones = basis.bones_view();
+                bones.map_or((0, 0, 0), |bones| (0, bones.node_count, bones.rest_places.len()))
+            }
+        };
+        let pieces = match tier {
+            TierChoice::Exact => basis.after().piece_count(components),
+            TierChoice::Bones => 0,
+        };
+        Self {
+            basis: basis.identity(),
             tier,
             kernels,
-            weights,
-            shares,
-            blocks,
-            gradients,
+            weights: carver.take(components),
+            shares: carver.take(components),
+            blocks: carver.take(basis.block_count()),
+            gradients: carver.take(nodes),
+            touched: carver.take(nodes.div_ceil(GROUP_NODES)),
+            forces: carver.take(solved.div_ceil(QUAD)),
             gradients_are_stale: false,
-            displacement,
-            solution,
-            maps,
-            posed,
+            displacement: carver.take(solved.div_ceil(QUAD)),
+            solution: carver.take(solved.div_ceil(QUAD)),
+            turned: carver.take(bones),
+            displaced: carver.take(bones.div_ceil(GROUP_NODES)),
+            maps: carver.take(bones),
+            added: Added::at_rest(carver.take(pieces)),
+            posed: carver.take(solved),
             bounds: Bounds::EMPTY,
-        })
+        }
     }
 
     /// Computes the features of the pose again, in network units; zero where no component reaches. Shape: `[V]`, source
@@ -241,18 +200,24 @@ impl<'w> Workspace<'w> {
     /// # Errors
     /// [`FrameError::ForeignWorkspace`], [`FrameError::NeedsExactTier`], [`FrameError::WrongLength`].
     pub fn features(&self, basis: &Basis<'_>, features: &mut [[f32; FEATURE_COUNT]]) -> Result<(), FrameError> {
-        self.validate_exact(basis)?;
-        check_length(basis, Buffer::Features, features.len())?;
-        let tier = basis.exact();
-        let decoder = decoder(&tier, self.shares, self.blocks, true);
+        let tier = self.validate_exact(basis)?;
+        check_length(basis.vertex_count(), Buffer::Features, features.len())?;
+        let decoder = decoder(basis, tier.patches, self.shares, self.blocks);
         let mut group = [[0.0; GROUP_NODES]; FEATURE_COUNT];
-        for (g, vertices) in basis.vertex_from_lane().chunks(GROUP_NODES).enumerate() {
-            self.kernels.features(&decoder, g, &mut group);
-            for (n, &v) in vertices.iter().enumerate() {
-                features[v as usize] = group.map(|row| row[n]);
+        for (slot, v) in basis.vertex_from_slot().iter().enumerate() {
+            let n = slot % GROUP_NODES;
+            if n == 0 {
+                self.kernels.features(&decoder, slot / GROUP_NODES, &mut group);
             }
+            features[v as usize] = group.map(|row| row[n]);
         }
         Ok(())
+    }
+
+    /// `D = T - I` of the pose at the tier's nodes: the vertices, in slots, or those that the bones are made of. Three columns,
+    /// each filled up with a zero. Shape: `[N]`.
+    pub fn gradients(&self) -> &[[[f32; 4]; 3]] {
+        self.gradients
     }
 
     /// Bounding box of the positions that the last job wrote: holds nothing, infinite and turned over, before the first.
@@ -278,37 +243,45 @@ impl<'w> Workspace<'w> {
     /// Back to rest, which is exact.
     pub(crate) fn rest(&mut self) {
         self.weights.fill(0.0);
-        self.shares.fill(Share::default());
+        self.shares.iter_mut().for_each(|share| share.factors = [0.0; 2]);
         self.gradients.fill([[0.0; 4]; 3]);
         self.gradients_are_stale = false;
-        self.displacement.fill([0.0; 4]);
+        self.forces.fill(Quad::default());
+        self.displacement.fill(Quad::default());
         self.maps.fill([[0.0; 4]; 4]);
+        self.added.rest();
     }
 
-    /// Refuses another basis, and the fast tier.
-    pub(crate) fn validate_exact(&self, basis: &Basis<'_>) -> Result<(), FrameError> {
+    /// The exact tier, which this workspace plays.
+    ///
+    /// Errors: [`FrameError::ForeignWorkspace`]; [`FrameError::NeedsExactTier`] for a workspace of another tier.
+    pub(crate) fn validate_exact<'a>(&self, basis: &Basis<'a>) -> Result<Tier<'a>, FrameError> {
         self.validate(basis)?;
         match self.tier {
-            TierChoice::Exact => Ok(()),
-            TierChoice::Fast => Err(FrameError::NeedsExactTier),
+            TierChoice::Exact => basis.exact().ok_or(FrameError::NeedsExactTier),
+            TierChoice::Bones => Err(FrameError::NeedsExactTier),
+        }
+    }
+
+    /// The bones, which this workspace plays.
+    ///
+    /// Errors: [`FrameError::ForeignWorkspace`]; [`FrameError::NeedsBones`] for a workspace of another tier.
+    pub(crate) fn validate_bones<'a>(&self, basis: &Basis<'a>) -> Result<BonesView<'a>, FrameError> {
+        self.validate(basis)?;
+        match self.tier {
+            TierChoice::Bones => basis.bones_view().ok_or(FrameError::NeedsBones),
+            TierChoice::Exact => Err(FrameError::NeedsBones),
         }
     }
 
     /// Refuses a basis other than the one this workspace was made for.
     pub(crate) fn validate(&self, basis: &Basis<'_>) -> Result<(), FrameError> {
-        if self.basis_id == basis.id() {
+        if self.basis == basis.identity() {
             Ok(())
         } else {
             Err(FrameError::ForeignWorkspace)
         }
     }
-}
-
-/// Splits the first `count` elements off aligned memory.
-pub(crate) fn carve<T: bytemuck::Pod>(memory: &mut [u8], count: usize) -> (&mut [T], &mut [u8]) {
-    let (section, rest) = memory.split_at_mut(section_bytes::<T>(count));
-    let section = &mut section[..count * size_of::<T>()];
-    (bytemuck::cast_slice_mut(section), rest)
 }
 
 #[cfg(test)]
@@ -367,7 +340,7 @@ mod tests {
             Workspace::new(&basis, &mut memory).unwrap().kernels(),
             Kernels::detect()
         );
-        for kernels in [Kernels::Scalar, Kernels::Avx2, Kernels::Avx512] {
+        for kernels in [Kernels::Scalar, Kernels::Portable, Kernels::Avx2, Kernels::Avx512] {
             let made = Workspace::with_kernels(&basis, &mut memory, kernels).map(|workspace| workspace.kernels());
             let missing = Err(WorkspaceError::KernelsMissing { kernels });
             assert_eq!(made, if kernels.run_here() { Ok(kernels) } else { missing });
@@ -376,26 +349,41 @@ mod tests {
     }
 
     #[test]
-    fn the_fast_tier_is_refused_where_there_is_none_and_carved_where_there_is() {
-        let (with, without) = (Package::small_with_fast_tier(1), Package::small(1));
+    fn bones_are_refused_where_there_are_none_and_carved_where_there_are() {
+        let (with, without) = (Package::small_with_bones(1), Package::small(1));
         let (with, without) = (open(&with), open(&without));
-        let none = Err(WorkspaceError::NoFastTier);
-        assert_eq!(WorkspaceLayout::for_tier(&without, TierChoice::Fast), none);
+        assert_eq!(
+            WorkspaceLayout::for_tier(&without, TierChoice::Bones),
+            Err(WorkspaceError::NoBones)
+        );
         let (mut memory, kernels) = (vec![0_u8; 100_000], Kernels::Scalar);
         let mut made = |basis, tier| {
             let workspace = Workspace::for_tier(basis, tier, &mut memory, kernels);
-            workspace.map(|workspace| (workspace.tier(), workspace.maps.len(), workspace.solution.len()))
+            workspace.map(|workspace| {
+                let solved = (workspace.solution.len(), workspace.posed.len());
+                (
+                    workspace.tier(),
+                    workspace.gradients.len(),
+                    workspace.maps.len(),
+                    solved,
+                )
+            })
         };
-        assert_eq!(made(&without, TierChoice::Fast), Err(WorkspaceError::NoFastTier));
-        let nodes = with.fast_node_count().unwrap();
-        assert_eq!(made(&with, TierChoice::Fast), Ok((TierChoice::Fast, nodes, 0)));
-        let padded = nodes.next_multiple_of(BLOCK);
-        assert_eq!(made(&with, TierChoice::Exact), Ok((TierChoice::Exact, 0, padded)));
+        assert_eq!(made(&without, TierChoice::Bones), Err(WorkspaceError::NoBones));
+        let info = with.bones().unwrap();
+        let (nodes, bones) = (info.node_count(), info.count());
+        assert_eq!(
+            made(&with, TierChoice::Bones),
+            Ok((TierChoice::Bones, nodes, bones, (0, 0)))
+        );
+        let count = with.vertex_count();
+        let exact = (TierChoice::Exact, count, 0, (count.div_ceil(QUAD), count));
+        assert_eq!(made(&with, TierChoice::Exact), Ok(exact));
 
-        let layout = WorkspaceLayout::for_tier(&with, TierChoice::Fast).unwrap();
+        let layout = WorkspaceLayout::for_tier(&with, TierChoice::Bones).unwrap();
         let mut memory = vec![0xff_u8; layout.unaligned_bytes()];
         let mut fits =
-            |bytes: usize| Workspace::for_tier(&with, TierChoice::Fast, &mut memory[..bytes], kernels).is_ok();
+            |bytes: usize| Workspace::for_tier(&with, TierChoice::Bones, &mut memory[..bytes], kernels).is_ok();
         assert!(fits(layout.unaligned_bytes()));
         assert!(!fits(layout.size_bytes - 1));
     }
@@ -405,9 +393,9 @@ mod tests {
         let package = Package::small(1);
         let basis = open(&package);
         let layout = WorkspaceLayout::for_basis(&basis);
-        let exact = 12 * basis.component_count() + 72 * basis.block_count() + 96 * basis.vertex_count();
+        let exact = 24 * basis.component_count() + 72 * basis.block_count() + 113 * basis.vertex_count();
         assert!(
-            layout.size_bytes <= exact + 8 * layout.alignment,
+            layout.size_bytes <= exact + 10 * layout.alignment,
             "{} {exact}",
             layout.size_bytes
         );

@@ -1,21 +1,25 @@
-// The page: opens packages, builds the sliders from the component tree, and runs a frame whenever something moved.
-// Address: `?package=FILE` opens another package than demo.sinew; `#c0=1.2&c0.1=-0.3` is a pose;
-// `?package=FILE&check=POSES` plays the poses and puts the checksum of the frames into the title, for tests.
+// The page: opens packages, plays them here or on the stage that serves it, and runs a frame whenever something moved.
+// Address: `?package=FILE` opens another package than demo.sinew; `?view=mesh` shows the mesh alone, `&background=transparent` or
+// a colour behind it; `#c0=1.2&c0.1=-0.3` is a pose, where there is no stage.
 "use strict";
 
 const element = (id) => document.getElementById(id);
-const stage = element("stage");
 const query = new URLSearchParams(location.search);
+const UNDO_MAX = 100;
 
 let module; // the compiled runtime
 let sinew; // the open package, if any
 let view; // none without WebGL
-let rows = []; // by component: { component, weight, show() }
+let grab; // nor without a view
 let animating = null; // time at which the animation started, in ms
 let due = false;
 let lastDrawn = 0;
+let state = null; // what the stage last said
+const undo = []; // poses
 const solved = new Mean(30);
 const between = new Mean(30);
+const tree = new Tree(element("sliders"), moveByHand, beginByHand);
+const link = new Link({ hello: onHello, frame: onFrame, state: onState, lost: onLost, refused: say });
 
 // A running mean of the last `size` numbers.
 function Mean(size) {
@@ -60,7 +64,10 @@ async function openPackage(bytes, name) {
   element("title").append(heading, document.createElement("br"), facts);
   document.title = `${name} - Sinew`;
   view?.setMesh(sinew.faces, sinew.positions.slice());
-  buildSliders();
+  grab?.setMesh(sinew);
+  undo.length = 0;
+  element("undo").disabled = true;
+  tree.build(sinew.components);
   enable(true);
   animate(false);
   solved.clear();
@@ -73,82 +80,27 @@ function enable(open) {
   for (const id of ["reset", "animate", "shuffle", "save"]) element(id).disabled = !open;
 }
 
-// One group a coarse component; under each component a fold with its children.
-function buildSliders() {
-  const children = new Map(sinew.components.map(({ index }) => [index, []]));
-  const top = [];
-  for (const component of sinew.components) (children.get(component.parent) ?? top).push(component);
-  rows = [];
-  // Many controls: show the coarse ones first.
-  const folded = sinew.components.length > 24;
-
-  const build = (component) => {
-    const group = document.createElement("div");
-    const below = children.get(component.index);
-    const row = buildRow(component, below.length > 0);
-    group.append(row.line);
-    if (below.length > 0) {
-      const list = document.createElement("div");
-      list.className = "children";
-      list.append(...below.map(build));
-      group.append(list);
-      const fold = (hide) => {
-        list.hidden = hide;
-        row.fold.setAttribute("aria-expanded", String(!hide));
-      };
-      row.fold.onclick = () => fold(!list.hidden);
-      row.below = below;
-      fold(folded);
-    }
-    return group;
-  };
-  const groups = top.map(build);
-  groups.forEach((group) => group.classList.add("group"));
-  element("sliders").replaceChildren(...groups);
-}
-
-function buildRow(component, hasChildren) {
-  const { index, name, parent, minimum, maximum } = component;
-  const line = document.createElement("div");
-  line.className = parent < 0 ? "row coarse" : "row";
-  const fold = document.createElement(hasChildren ? "button" : "span");
-  if (hasChildren) {
-    fold.className = "fold";
-    fold.title = "Finer components";
-  }
-  const label = document.createElement("label");
-  label.className = "name";
-  label.textContent = name;
-  label.title = `${name}: from ${minimum.toFixed(2)} to ${maximum.toFixed(2)}; click for rest`;
-  const track = document.createElement("span");
-  track.className = "track";
-  track.style.setProperty("--rest", maximum > minimum ? String(-minimum / (maximum - minimum)) : "0");
-  const slider = Object.assign(document.createElement("input"), { type: "range", min: minimum, max: maximum, step: "any" });
-  slider.setAttribute("aria-label", name);
-  const number = Object.assign(document.createElement("input"), { type: "number", step: "0.01", min: minimum, max: maximum });
-  number.setAttribute("aria-label", `${name}, weight`);
-  track.append(slider);
-  line.append(fold, label, track, number);
-
-  const row = { component, line, fold, below: [], weight: 0 };
-  row.show = () => {
-    slider.value = String(row.weight);
-    if (document.activeElement !== number) number.value = row.weight.toFixed(2);
-    line.classList.toggle("moved", row.weight !== 0);
-  };
-  slider.oninput = () => moveByHand(index, slider.valueAsNumber);
-  number.oninput = () => Number.isFinite(number.valueAsNumber) && moveByHand(index, number.valueAsNumber);
-  number.onblur = row.show;
-  label.onclick = () => moveByHand(index, 0);
-  rows[index] = row;
-  row.show();
-  return row;
-}
-
-function move(index, weight) {
-  const row = rows[index];
+// A weight as it is now, here and on its slider.
+function show(index, weight) {
+  const row = tree.rows[index];
   row.weight = sinew.set(index, weight);
   row.show();
+}
+
+// A weight as somebody here wants it: on a stage it is asked for, and comes back with the next frame.
+function move(index, weight) {
+  if (link.isOpen) link.set(index, weight);
+  else show(index, weight);
+}
+
+// The pose before a hand moves it, for undo.
+function beginByHand() {
+  const pose = tree.rows.map(({ weight }) => weight);
+  const last = undo.at(-1);
+  if (last?.every((weight, index) => weight === pose[index])) return;
+  undo.push(pose);
+  if (undo.length > UNDO_MAX) undo.shift();
+  element("undo").disabled = false;
 }
 
 function moveByHand(index, weight) {
@@ -166,6 +118,20 @@ function animate(on) {
   animating = on ? performance.now() : null;
   element("animate").setAttribute("aria-pressed", String(on));
   if (on) update();
+}
+
+// A hand on the mesh has moved the runtime's weights.
+function moveByGrab() {
+  animate(false);
+  for (const row of tree.rows) {
+    const weight = sinew.weight(row.component.index);
+    if (weight !== row.weight) {
+      move(row.component.index, weight);
+      row.weight = weight;
+      row.show();
+    }
+  }
+  update();
 }
 
 // Asks for a frame; many wishes between two pictures are one.
@@ -198,10 +164,9 @@ function tick(now) {
       view?.setFrame(sinew.positions, sinew.normals);
       rememberPose();
     }
-    for (const { line, below } of rows) {
-      line.classList.toggle("hides-moved", below.some(({ index }) => rows[index].weight !== 0));
-    }
+    tree.markHidden();
   }
+  grab?.place();
   view?.draw();
   showStats(now);
   if (animating !== null) update();
@@ -216,28 +181,93 @@ function showStats(now) {
   const lines = [
     Number.isNaN(pictures) ? "" : `${(1000 / pictures).toFixed(0)} fps`,
     Number.isNaN(frame) ? "" : `frame ${frame.toFixed(frame < 10 ? 2 : 1)} ms`,
+    state && link.isOpen ? `stage ${state.fps} fps, ${count(state.screens, "screen", "screens")}` : "",
   ];
   element("stats").textContent = lines.filter((line) => line !== "").join("\n");
 }
 
-// The pose in the address, once the hand rests.
+// The pose in the address, once the hand rests; a stage has its own.
 let poseTimer;
 function rememberPose() {
   clearTimeout(poseTimer);
-  if (animating !== null) return;
+  if (animating !== null || link.isOpen) return;
   poseTimer = setTimeout(() => {
-    const moved = rows.filter(({ weight }) => weight !== 0);
+    const moved = tree.rows.filter(({ weight }) => weight !== 0);
     const pose = moved.map(({ component, weight }) => `${encodeURIComponent(component.name)}=${weight.toFixed(4)}`);
     history.replaceState(null, "", `${location.pathname}${location.search}#${pose.join("&")}`);
   }, 300);
 }
 
 function poseFromAddress() {
-  for (const [name, weight] of new URLSearchParams(location.hash.slice(1))) {
-    const component = sinew.components.find((component) => component.name === name);
-    if (component && Number.isFinite(Number(weight))) move(component.index, Number(weight));
+  const named = new Map(new URLSearchParams(location.hash.slice(1)));
+  if (named.size === 0) return;
+  const weights = sinew.components.map(({ name }) => Number(named.get(name) ?? 0));
+  moveAll(({ index }) => (Number.isFinite(weights[index]) ? weights[index] : 0));
+}
+
+// A stage: its package, its transport, its knobs.
+async function onHello(hello) {
+  element("transport").hidden = element("show").hidden = false;
+  element("open").hidden = true;
+  document.body.classList.toggle("replay", hello.replay);
+  for (const id of ["stop", "record", "previous", "next", "into", "out", "next-fine"]) element(id).disabled = hello.replay;
+  for (const id of ["into", "out", "next-fine"]) element(id).hidden = !hello.tree;
+  for (const id of ["previous", "next"]) element(id).hidden = !hello.tree && hello.pages < 2;
+  element("knobs").replaceChildren(...hello.knobs.map((name) => {
+    const item = document.createElement("li");
+    const meter = Object.assign(document.createElement("meter"), { min: 0, max: 1 });
+    meter.setAttribute("aria-label", name);
+    item.append(name, meter);
+    return item;
+  }));
+  const token = query.get("token");
+  try {
+    await openPackage(await read(token ? `package.sinew?token=${encodeURIComponent(token)}` : "package.sinew"), hello.title.split(": ")[0]);
+    if (hello.replay) say("A take is replayed: it is seen here, and not moved.");
+  } catch (error) {
+    say(error.message);
   }
+}
+
+function onFrame({ weights, knobs, assignments }) {
+  if (weights.length !== tree.rows.length) return; // of a package that is still on its way
+  weights.forEach((weight, index) => {
+    // A vertex in the hand is ahead of the stage.
+    if (tree.rows[index].weight !== weight && !grab?.held) show(index, weight);
+  });
+  tree.showKnobs(assignments);
+  const items = element("knobs").children;
+  knobs.forEach((position, knob) => {
+    const item = items[knob];
+    if (!item) return;
+    const own = assignments.find((assignment) => assignment.knob === knob);
+    item.lastChild.value = Number.isNaN(position) ? 0 : position;
+    item.className = own?.state === "engaged" ? "engaged" : own?.state.startsWith("turn") ? "waiting" : "";
+    item.title = own ? `${tree.rows[own.component].component.name}: ${words(own)}` : "moves nothing here";
+  });
   update();
+}
+
+function onState(message) {
+  state = message;
+  element("device").textContent = message.device ?? "no device";
+  element("knobs").hidden = message.device === null;
+  element("where").textContent = message.where;
+  const warnings = element("warnings");
+  if (warnings.dataset.shown !== message.warnings.join("\n")) {
+    warnings.dataset.shown = message.warnings.join("\n");
+    warnings.replaceChildren(...message.warnings.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
+  }
+  element("stop").setAttribute("aria-pressed", String(message.stopped));
+  element("stop").textContent = message.stopped ? "Release" : "Stop";
+  element("record").setAttribute("aria-pressed", String(message.recording !== null));
+  element("record").title = message.recording ? `Recording ${message.recording}; click to end (T)` : "Begin to record a take (T)";
+  update();
+}
+
+function onLost() {
+  element("warnings").dataset.shown = "";
+  element("device").textContent = "The stage is gone; this page goes on by itself and looks for it.";
 }
 
 function saveObj() {
@@ -260,7 +290,7 @@ async function openFile(file) {
   await openPackage(await file.arrayBuffer(), file.name);
 }
 
-function listen() {
+function listenToButtons() {
   element("open").onclick = () => element("file").click();
   element("file").onchange = ({ target }) => {
     if (target.files[0]) openFile(target.files[0]);
@@ -268,41 +298,78 @@ function listen() {
   };
   element("reset").onclick = () => {
     animate(false);
-    moveAll(() => 0);
+    beginByHand();
+    if (link.isOpen) link.ask({ ask: "rest" });
+    else moveAll(() => 0);
   };
-  element("animate").onclick = () => animate(animating === null);
+  element("undo").onclick = () => {
+    animate(false);
+    const pose = undo.pop();
+    element("undo").disabled = undo.length === 0;
+    if (pose) moveAll(({ index }) => pose[index]);
+  };
+  element("animate").onclick = () => {
+    if (animating === null) beginByHand();
+    animate(animating === null);
+  };
   element("shuffle").onclick = () => {
     animate(false);
+    beginByHand();
     moveAll(({ minimum, maximum }) => 0.7 * (minimum + Math.random() * (maximum - minimum)));
   };
   element("save").onclick = saveObj;
   element("message").onclick = () => say("");
+  element("stop").onclick = () => link.ask({ ask: "stop-or-release" });
+  element("record").onclick = () => link.ask({ ask: "record" });
+  for (const name of ["previous", "next", "into", "out", "next-fine"]) {
+    element(name).onclick = () => link.ask({ ask: "command", name });
+  }
   for (const [id, option] of [["wire", "showWire"], ["heat", "showHeat"], ["z-up", "zUp"]]) {
     element(id).onchange = ({ target }) => {
       if (view) view[option] = target.checked;
       update();
     };
   }
-  const keys = { r: "reset", " ": "animate", w: "wire", d: "heat" };
+}
+
+function listenToKeys() {
+  const here = { r: "reset", a: "animate", w: "wire", d: "heat" };
+  const onStage = { " ": "stop", t: "record", ",": "previous", ".": "next", i: "into", o: "out", n: "next-fine" };
   addEventListener("keydown", (event) => {
-    if (event.target.matches("input, button, summary") || event.ctrlKey || event.metaKey || event.altKey) return;
     const key = event.key.toLowerCase();
+    const isInField = event.target.matches("input[type=number]");
+    if ((event.ctrlKey || event.metaKey) && key === "z" && !isInField) {
+      element("undo").click();
+      event.preventDefault();
+      return;
+    }
+    if (isInField || event.ctrlKey || event.metaKey || event.altKey) return;
+    // The space bar presses the button that has the focus.
+    if (key === " " && event.target.matches("button, summary, input")) return;
+    const id = here[key] ?? (link.isOpen ? onStage[key] : undefined);
     if (key === "f") view?.frameMesh();
-    else if (keys[key]) element(keys[key]).click();
+    else if (key === "escape") grab?.letGo();
+    else if (id && !element(id).hidden) element(id).click();
     else return;
     event.preventDefault();
   });
+}
+
+function listen() {
+  listenToButtons();
+  listenToKeys();
   addEventListener("resize", update);
-  addEventListener("hashchange", () => sinew && poseFromAddress());
+  addEventListener("hashchange", () => sinew && !link.isOpen && poseFromAddress());
+  const stage = element("stage");
   addEventListener("dragover", (event) => {
     event.preventDefault();
-    stage.classList.add("dropping");
+    stage.classList.toggle("dropping", !link.isOpen);
   });
   addEventListener("dragleave", (event) => event.relatedTarget === null && stage.classList.remove("dropping"));
   addEventListener("drop", (event) => {
     event.preventDefault();
     stage.classList.remove("dropping");
-    if (event.dataTransfer.files[0]) openFile(event.dataTransfer.files[0]);
+    if (event.dataTransfer.files[0] && !link.isOpen) openFile(event.dataTransfer.files[0]);
   });
   const scheme = matchMedia("(prefers-color-scheme: dark)");
   const colour = () => {
@@ -314,20 +381,37 @@ function listen() {
   colour();
 }
 
+// What the address says about the look.
+function dress() {
+  if (query.get("view") === "mesh") document.body.classList.add("mesh-only");
+  const ground = query.get("background");
+  if (ground !== null && CSS.supports("color", ground)) {
+    document.documentElement.style.background = "none";
+    element("stage").style.setProperty("--ground", ground);
+    element("stage").style.background = ground;
+  }
+}
+
 async function start() {
   enable(false);
+  dress();
   try {
     view = new MeshView(element("canvas"), update);
+    grab = new Grab(view, { begin: beginByHand, moved: moveByGrab, refused: say });
+    view.grab = grab;
   } catch (error) {
     say(error.message);
   }
   listen();
   try {
-    module = await WebAssembly.compile(await read("sinew.wasm"));
+    module = await WebAssembly.compile(await read(Sinew.fileName()));
   } catch (error) {
     say(`The runtime could not be loaded (${error.message}). Serve this folder over HTTP, or open sinew.html.`);
     return;
   }
+  // A page that a stage serves plays what the stage plays.
+  const mayHaveStage = location.protocol.startsWith("http") && !query.has("package") && !globalThis.SINEW_FILES;
+  if (mayHaveStage && (await link.connect())) return;
   const name = query.get("package") ?? "demo.sinew";
   try {
     await openPackage(await read(name), name.split("/").pop());
@@ -338,13 +422,6 @@ async function start() {
   element("welcome").hidden = sinew !== undefined;
   if (!sinew) return;
   poseFromAddress();
-  if (query.has("check")) {
-    try {
-      document.title = `checksum ${sinew.checksum(new TextDecoder().decode(await read(query.get("check"))))}`;
-    } catch (error) {
-      document.title = `failed: ${error.message}`;
-    }
-  }
 }
 
 start();

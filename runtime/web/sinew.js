@@ -3,7 +3,18 @@
 "use strict";
 
 class Sinew {
-  // From the bytes of sinew.wasm, or from a module compiled before. Each instance plays one package at a time.
+  // Which of the two builds this engine can run: the one with vectors of four numbers, or the one without, which is slower and
+  // plays the same bits.
+  static fileName() {
+    // () -> v128, of a splat: refused where there are no vectors.
+    const types = [1, 5, 1, 0x60, 0, 1, 0x7b];
+    const code = [10, 8, 1, 6, 0, 0x41, 0, 0xfd, 15, 0x0b];
+    const header = [0, 0x61, 0x73, 0x6d, 1, 0, 0, 0];
+    const hasVectors = WebAssembly.validate(Uint8Array.from([...header, ...types, 3, 2, 1, 0, ...code]));
+    return hasVectors ? "sinew.wasm" : "sinew-scalar.wasm";
+  }
+
+  // From the bytes of the file that `fileName` names, or from a module compiled before. Each instance plays one package at a time.
   static async load(source) {
     const module = source instanceof WebAssembly.Module ? source : await WebAssembly.compile(source);
     return new Sinew((await WebAssembly.instantiate(module, {})).exports);
@@ -49,9 +60,9 @@ class Sinew {
     return this.#taken(this.call.sinew_set_control(component, weight));
   }
 
-  // Sets a control by a knob that reads 0 to 1023 between the stops; returns the weight it took.
-  setKnob(component, knob) {
-    return this.#taken(this.call.sinew_set_knob(component, knob));
+  // Sets a control by the share of its way from the lower stop, 0, to the upper one, 1; returns the weight it took.
+  setShare(component, share) {
+    return this.#taken(this.call.sinew_set_share(component, share));
   }
 
   // All controls to rest.
@@ -59,22 +70,30 @@ class Sinew {
     if (this.call.sinew_reset() < 0) throw this.#refusal();
   }
 
+  // The weight of a control.
+  weight(component) {
+    return this.#taken(this.call.sinew_weight(component));
+  }
+
+  // Takes hold of a vertex where the last frame has it; `drag` moves it, and every held vertex keeps its place as well as it can.
+  hold(vertex) {
+    if (this.call.sinew_hold(vertex) < 0) throw this.#refusal();
+  }
+
+  letGo(vertex) {
+    if (this.call.sinew_let_go(vertex) < 0) throw this.#refusal();
+  }
+
+  // Moves the weights so that a held vertex comes to a point, [x, y, z] in units of the source.
+  drag(vertex, [x, y, z]) {
+    if (this.call.sinew_drag(vertex, x, y, z) < 0) throw this.#refusal();
+  }
+
   // Deforms. Returns true when positions and normals have changed.
   frame() {
     const status = this.call.sinew_frame();
     if (status < 0) throw this.#refusal();
     return status === 0;
-  }
-
-  // Plays poses, one a line, knobs from 0 to 1023 joined by "|"; returns the checksum of all frames: sixteen digits.
-  checksum(poses) {
-    let sum = this.call.sinew_checksum_start();
-    for (const line of poses.split("\n").filter((line) => line !== "")) {
-      line.split("|").forEach((knob, component) => this.setKnob(component, Number(knob)));
-      this.frame();
-      sum = this.call.sinew_checksum(sum);
-    }
-    return BigInt.asUintN(64, sum).toString(16).padStart(16, "0");
   }
 
   #taken(weight) {

@@ -1,4 +1,4 @@
-// The picture: a shaded mesh on a canvas through WebGL 2, orbited by mouse, pen or fingers.
+// The picture: a shaded mesh on a canvas through WebGL 2, orbited by mouse, pen, fingers or keys.
 "use strict";
 
 const VERTEX_SHADER = `#version 300 es
@@ -45,7 +45,7 @@ const HOT_AT = 0.2;
 const FIELD_OF_VIEW = (35 * Math.PI) / 180;
 const PITCH_LIMIT = 1.55;
 
-const subtract = (a, b) => a.map((x, i) => x - b[i]);
+const subtract = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const unit = (a) => a.map((x) => x / Math.hypot(...a));
@@ -60,6 +60,7 @@ class MeshView {
     this.zUp = false;
     this.lineColour = [0, 0, 0];
     this.indexCount = 0;
+    this.grab = null; // takes presses on the mesh, if any
     const gl = canvas.getContext("webgl2", { antialias: true, alpha: true });
     if (!gl) throw new Error("This browser gives no WebGL 2, which the picture needs.");
     this.gl = gl;
@@ -138,6 +139,54 @@ class MeshView {
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.wireIndices);
       gl.drawElements(gl.LINES, this.wireCount, gl.UNSIGNED_INT, 0);
     }
+  }
+
+  // The vertex seen under a point of the canvas and how far it is from the eye, or null: of those that are no further than `reach` CSS
+  // pixels from it and whose normals look at the eye, the nearest to the eye, give or take the reach.
+  vertexAt(positions, normals, x, y, reach) {
+    const camera = this.#camera();
+    const toScreen = this.#toScreen(camera);
+    let found = null;
+    for (let v = 0; v < positions.length / 3; v++) {
+      const at = [positions[3 * v], positions[3 * v + 1], positions[3 * v + 2]];
+      const [sx, sy, depth] = toScreen(at);
+      const away = Math.hypot(sx - x, sy - y);
+      if (depth <= 0 || away > reach) continue;
+      const normal = [normals[3 * v], normals[3 * v + 1], normals[3 * v + 2]];
+      if (dot(normal, subtract(camera.eye, at)) <= 0) continue;
+      const cost = depth + away * this.#unitsPerPixel(depth);
+      if (found === null || cost < found.cost) found = { vertex: v, depth, cost };
+    }
+    return found;
+  }
+
+  // The point of space under a point of the canvas, at a distance from the eye along the view.
+  pointAt(x, y, depth) {
+    const { eye, right, up, back } = this.#camera();
+    const scale = this.#unitsPerPixel(depth);
+    const [dx, dy] = [(x - 0.5 * this.canvas.clientWidth) * scale, (0.5 * this.canvas.clientHeight - y) * scale];
+    return eye.map((e, c) => e + dx * right[c] + dy * up[c] - depth * back[c]);
+  }
+
+  // Where a vertex is on the canvas, in CSS pixels.
+  screenOf(positions, vertex) {
+    return this.#toScreen(this.#camera())(positions.slice(3 * vertex, 3 * vertex + 3));
+  }
+
+  #toScreen({ eye, right, up, back }) {
+    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight];
+    return (point) => {
+      const from = subtract(point, eye);
+      const depth = -(from[0] * back[0] + from[1] * back[1] + from[2] * back[2]);
+      const scale = this.#unitsPerPixel(depth);
+      return [0.5 * width + dot(from, right) / scale, 0.5 * height - dot(from, up) / scale, depth];
+    };
+  }
+
+  // A narrow window shows the whole width instead of the whole height.
+  #unitsPerPixel(depth) {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    return (2 * depth * Math.tan(0.5 * FIELD_OF_VIEW)) / Math.max(1, Math.min(width, height));
   }
 
   #compile() {
@@ -225,11 +274,16 @@ class MeshView {
     this.target = this.target.map((x, c) => x + step * (dy * up[c] - dx * right[c]));
   }
 
+  #turn(yaw, pitch) {
+    this.yaw += yaw;
+    this.pitch = Math.min(Math.max(this.pitch + pitch, -PITCH_LIMIT), PITCH_LIMIT);
+  }
+
   #zoom(factor) {
     this.distance = Math.min(Math.max(this.distance * factor, 0.05 * this.radius), 40 * this.radius);
   }
 
-  // One finger or the main button turns; two fingers, another button or shift pan; pinch and wheel zoom.
+  // What is not on the mesh: one finger or the main button turns; two fingers, another button or shift pan; pinch and wheel zoom.
   #listen() {
     const { canvas } = this;
     const held = new Map();
@@ -239,9 +293,11 @@ class MeshView {
     };
     canvas.addEventListener("pointerdown", (event) => {
       canvas.setPointerCapture(event.pointerId);
+      if (held.size === 0 && this.grab?.press(event)) return;
       held.set(event.pointerId, { x: event.clientX, y: event.clientY });
     });
     canvas.addEventListener("pointermove", (event) => {
+      if (this.grab?.drag(event)) return;
       const at = held.get(event.pointerId);
       if (!at) return;
       const [dx, dy] = [event.clientX - at.x, event.clientY - at.y];
@@ -253,13 +309,15 @@ class MeshView {
       } else if (event.shiftKey || event.buttons & ~1) {
         this.#pan(dx, dy);
       } else {
-        this.yaw -= 0.008 * dx;
-        this.pitch = Math.min(Math.max(this.pitch + 0.008 * dy, -PITCH_LIMIT), PITCH_LIMIT);
+        this.#turn(-0.008 * dx, 0.008 * dy);
       }
       this.onChange();
     });
     for (const end of ["pointerup", "pointercancel"]) {
-      canvas.addEventListener(end, (event) => held.delete(event.pointerId));
+      canvas.addEventListener(end, (event) => {
+        held.delete(event.pointerId);
+        this.grab?.release(event);
+      });
     }
     const onWheel = (event) => {
       event.preventDefault();
@@ -269,5 +327,14 @@ class MeshView {
     canvas.addEventListener("wheel", onWheel, { passive: false });
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     canvas.addEventListener("dblclick", () => this.frameMesh());
+    const turns = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] };
+    canvas.addEventListener("keydown", (event) => {
+      const [yaw, pitch] = turns[event.key] ?? [0, 0];
+      if (yaw || pitch) this.#turn(yaw, pitch);
+      else if (event.key === "+" || event.key === "-") this.#zoom(event.key === "+" ? 0.9 : 1.1);
+      else return;
+      event.preventDefault();
+      this.onChange();
+    });
   }
 }

@@ -1,66 +1,19 @@
 //! Opening a package, carving a workspace and playing allocate nothing, refusals included: counted by the allocator.
 
-use core::alloc::{GlobalAlloc, Layout};
-use core::cell::Cell;
-use std::alloc::System;
-
 use sinew_formats::package::{fixture::tiny_baked, write_baked};
 use sinew_runtime::{
-    Attribute, Basis, Batch, ControlError, Controls, Drag, Frame, FrameError, FrameOutcome, Handles, HandlesLayout,
-    Instance, Kernels, Normals, OpenError, Reconstruct, Tangent, TierChoice, VertexLayout, VertexOutput, Workspace,
-    WorkspaceError, WorkspaceLayout,
+    Attribute, Basis, Batch, BoneMaps, BoneOutput, ControlError, Controls, Drag, Frame, FrameError, FrameOutcome,
+    Handles, HandlesLayout, Instance, Kernels, Normals, OpenError, Reconstruct, Tangent, TierChoice, VertexLayout,
+    VertexOutput, Workspace, WorkspaceError, WorkspaceLayout,
 };
-
-thread_local! {
-    /// Requests of this thread. The test harness allocates on others.
-    static REQUESTS: Cell<u64> = const { Cell::new(0) };
-}
-
-struct Counting;
-
-// SAFETY: every request goes to the system's allocator unchanged; counting touches a thread's own cell without heap.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        REQUESTS.set(REQUESTS.get() + 1);
-        // SAFETY: the caller's promise, passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        REQUESTS.set(REQUESTS.get() + 1);
-        // SAFETY: the caller's promise, passed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, new_bytes: usize) -> *mut u8 {
-        REQUESTS.set(REQUESTS.get() + 1);
-        // SAFETY: the caller's promise, passed on.
-        unsafe { System.realloc(pointer, layout, new_bytes) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-/// Runs `work` and returns how often it went to the allocator.
-fn requests(work: impl FnOnce()) -> u64 {
-    let before = REQUESTS.get();
-    work();
-    REQUESTS.get() - before
-}
+use sinew_support::requests;
 
 /// The tiny package, and one of the same shape with another rest mesh.
 fn packages() -> [sinew_formats::package::AlignedBytes; 2] {
     let baked = tiny_baked();
     let mut other = tiny_baked();
-    other.exact.rest_positions[0][2] += 0.25;
+    other.rest_positions[0][2] += 0.25;
     [baked, other].map(|baked| write_baked(&baked.basis()).expect("the fixture is valid"))
-}
-
-#[test]
-fn the_counter_counts() {
-    assert_eq!(requests(|| drop(core::hint::black_box(Box::new(1)))), 2);
-    assert_eq!(requests(|| ()), 0);
 }
 
 #[test]
@@ -114,24 +67,36 @@ fn a_thousand_frames_allocate_nothing() {
 }
 
 #[test]
-fn frames_of_the_fast_tier_allocate_nothing() {
+fn bones_posed_and_skinned_allocate_nothing() {
     let mut tiny = tiny_baked();
-    tiny.fast = Some(tiny.own_nodes());
+    let bone_count = tiny.bones.insert(tiny.three_bones()).rest_places.len();
     let bytes = write_baked(&tiny.basis()).expect("the fixture is valid");
-    let layout = WorkspaceLayout::for_tier(&Basis::open(&bytes).expect("valid"), TierChoice::Fast).expect("it has one");
+    let tier = TierChoice::Bones;
+    let layout = WorkspaceLayout::for_tier(&Basis::open(&bytes).expect("valid"), tier).expect("it has bones");
     let mut memory = vec![0; layout.unaligned_bytes()];
     let mut weights = [0.0; sinew_formats::package::fixture::COMPONENT_COUNT];
     let mut positions = [[0.0; 3]; sinew_formats::package::fixture::VERTEX_COUNT];
     let mut normals = positions;
+    let mut maps = vec![[0.0; 12]; bone_count];
+    let mut few = [[0.0; 12]; 2];
+    let mut joints = vec![sinew_runtime::BoneTransform::default(); bone_count];
     let count = requests(|| {
         let basis = Basis::open(&bytes).expect("valid");
-        let kernels = Kernels::detect();
-        let made = Workspace::for_tier(&basis, TierChoice::Fast, &mut memory, kernels);
-        let mut workspace = made.expect("enough memory");
+        let mut workspace = Workspace::for_tier(&basis, tier, &mut memory, Kernels::detect()).expect("enough memory");
         let mut controls = Controls::new(&basis, &mut weights).expect("one weight a component");
         for frame in 0..1000 {
             let k = frame % basis.component_count();
             controls.set(k, (frame as f32 * 0.1).sin()).expect("finite");
+            for maps in [
+                BoneOutput::Rows(&mut maps),
+                BoneOutput::Columns(&mut few),
+                BoneOutput::Scaled(&mut joints),
+            ] {
+                let right = !matches!(maps, BoneOutput::Columns(_));
+                let (basis, controls) = (&basis, &controls);
+                let outcome = BoneMaps { basis, controls, maps }.run(&mut workspace);
+                assert_eq!(outcome.is_ok(), right, "too few maps are refused");
+            }
             let job = Frame {
                 basis: &basis,
                 controls: &controls,
@@ -140,7 +105,7 @@ fn frames_of_the_fast_tier_allocate_nothing() {
             };
             job.run(&mut workspace).expect("finite");
         }
-        assert!(basis.fast_error().is_some());
+        assert!(basis.bones().is_some());
     });
     assert_eq!(count, 0);
 }
@@ -159,7 +124,7 @@ fn refusals_allocate_nothing() {
     let (mut positions, mut normals) = (vec![[0.0; 3]; vertex_count], vec![[0.0; 3]; vertex_count]);
     let features = vec![[f32::NAN; 9]; vertex_count];
     let count = requests(|| {
-        assert!(matches!(Basis::open(&damaged), Err(OpenError::PayloadCorrupt { .. })));
+        assert!(matches!(Basis::open(&damaged), Err(OpenError::ContentIdMismatch)));
         assert!(Basis::open(&bytes[..last]).is_err());
         assert!(Basis::open(&[]).is_err());
 

@@ -18,9 +18,16 @@ fn a_program_without_an_allocator_links_and_plays_the_same_bits() -> Result<(), 
     let package = scratch.join("tiny.sinew");
     fs::write(&package, &bytes[..])?;
 
-    // The versions that this workspace is tested with; cargo drops what the program does not need.
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("embedded");
-    fs::copy(source.join("../../Cargo.lock"), source.join("Cargo.lock"))?;
+    // A copy: the checkout may be read-only. With the versions that this workspace is tested with; cargo drops what the program
+    // does not need.
+    let tests = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let source = scratch.join("source");
+    fs::create_dir_all(source.join("src"))?;
+    fs::copy(tests.join("embedded/src/main.rs"), source.join("src/main.rs"))?;
+    fs::copy(tests.join("../Cargo.lock"), source.join("Cargo.lock"))?;
+    let manifest = fs::read_to_string(tests.join("embedded/Cargo.toml"))?;
+    let absolute = format!("path = \"{}/embedded/..", tests.display());
+    fs::write(source.join("Cargo.toml"), manifest.replace("path = \"..", &absolute))?;
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let built = Command::new(cargo)
         .args(["build", "--release", "--offline", "--quiet", "--manifest-path"])

@@ -7,22 +7,21 @@
 use core::error::Error;
 use std::collections::BTreeMap;
 
-use half::f16;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use sinew_bake::bake;
 use sinew_formats::package::{
-    BlockRecord, CompactBasis, CompactView, ComponentRecord, FEATURE_COUNT, GraphConvRecord, NONE, Provenance, Quality,
-    RenderMesh, write_compact,
+    After, BlockRecord, CompactBasis, CompactView, ComponentRecord, FEATURE_COUNT, GraphConvRecord, NO_PIECE, NONE,
+    Prior, Provenance, Quality, Surface, ValueScales, write_compact,
 };
 use sinew_runtime::{Basis, Controls, Frame, Workspace, WorkspaceLayout};
-use sinew_trainer::bake::bake;
 
-/// Of the bounding box's diagonal, where folding is exact in f16: f32 on the frame path is all that is left. Found: 8e-8.
+/// Of the bounding box's diagonal, where folding is exact in whole numbers: f32 on the frame path is all that is left.
 const FRAME_TOLERANCE: f64 = 5e-7;
 /// Share of the pose's own largest movement, where the decoder mixes features and neighbours: folding rounds every value
-/// to f16 once more, by at most half a unit in the last place. Found: 1.2e-4.
-const FOLDED_TOLERANCE: f64 = 1.0 / 4096.0;
+/// once more, by at most half a 32767th of the component's greatest.
+const FOLDED_TOLERANCE: f64 = 1.0 / 32_768.0;
 
 /// Weights of a pose are drawn within these: small, ordinary, at the limit of the training shapes, and beyond.
 const AMPLITUDES: [f32; 4] = [0.1, 0.5, 1.0, 2.0];
@@ -36,11 +35,18 @@ struct Compact {
     blocks: Vec<BlockRecord>,
     parents: Vec<u32>,
     supports: Vec<Vec<bool>>,
-    values: Vec<Vec<[f32; FEATURE_COUNT]>>,
+    /// Exactly what whole numbers stand for.
+    values: Vec<Vec<[f64; FEATURE_COUNT]>>,
+    whole: Vec<[i16; FEATURE_COUNT]>,
+    scales: Vec<ValueScales>,
+    piece_of: Vec<u16>,
+    piece_offsets: Vec<[f32; 3]>,
+    modes: Vec<[i16; 3]>,
+    mix: Vec<f32>,
 }
 
 const NAMES: [&str; 7] = ["c0", "c1", "c2", "c0.f0", "c0.f1", "c1.f0", "c2.f0"];
-const VALUE_SCALE: f32 = 0.25;
+const MODE_SCALES: [f32; 2] = [2e-6, 1e-6];
 const ROTATION_SCALE: f32 = 2.0;
 const STRETCH_SCALE: f32 = 0.5;
 
@@ -79,6 +85,12 @@ fn compact(seed: u64, mixing: f32) -> Compact {
         parents: vec![NONE, 0, 1, 2],
         supports: vec![],
         values: vec![],
+        whole: vec![],
+        scales: vec![],
+        piece_of: vec![],
+        piece_offsets: vec![],
+        modes: vec![],
+        mix: vec![],
     };
     add_patch(&mut compact, 11, 8, 0.0, &mut rng);
     let first_patch = compact.rest.len() as u32;
@@ -125,12 +137,27 @@ fn compact(seed: u64, mixing: f32) -> Compact {
         let bump = |p: &[f32; 3]| 1.0 - ((p[0] - x).powi(2) + (p[1] - y).powi(2)) / (radius * radius);
         let support: Vec<bool> = compact.rest.iter().map(|p| bump(p) > 0.0).collect();
         let inside = compact.rest.iter().filter(|p| bump(p) > 0.0);
-        let values = inside
-            .map(|p| peak.map(|a| f16::from_f32(a * bump(p)).to_f32()))
-            .collect();
+        let values: Vec<_> = inside.map(|p| peak.map(|a| 0.25 * a * bump(p))).collect();
+        let scales = ValueScales::for_values(&values);
+        let whole: Vec<_> = values.iter().map(|value| scales.round(value)).collect();
+        let units = scales.by_feature().map(f64::from);
+        let exact = |whole: &[i16; FEATURE_COUNT]| core::array::from_fn(|c| f64::from(whole[c]) * units[c]);
+        compact.values.push(whole.iter().map(exact).collect());
+        compact.whole.extend(whole);
+        compact.scales.push(scales);
         compact.supports.push(support);
-        compact.values.push(values);
     }
+    let count = compact.rest.len();
+    compact.piece_of = (0..count)
+        .map(|v| if v % 5 == 0 { (v % 2) as u16 } else { NO_PIECE })
+        .collect();
+    compact.piece_offsets = (0..2 * NAMES.len())
+        .map(|_| core::array::from_fn(|_| rng.random_range(-0.2..0.2)))
+        .collect();
+    compact.mix = (0..2 * NAMES.len()).map(|_| rng.random_range(-1.0..1.0)).collect();
+    compact.modes = (0..2 * count)
+        .map(|_| core::array::from_fn(|_| rng.random_range(-32_767..=32_767)))
+        .collect();
     compact
 }
 
@@ -143,7 +170,8 @@ impl Compact {
         let components: Vec<_> = NAMES
             .iter()
             .zip(block_of)
-            .map(|(name, block)| ComponentRecord {
+            .zip(&self.scales)
+            .map(|((name, block), &value_scales)| ComponentRecord {
                 name,
                 block,
                 centre_vertex: 0,
@@ -152,7 +180,7 @@ impl Compact {
                 locality: 1.0,
                 minimum: -3.0,
                 maximum: 3.0,
-                value_scale: VALUE_SCALE,
+                value_scales,
             })
             .collect();
         let words = self.supports.iter().flat_map(|support| {
@@ -160,14 +188,9 @@ impl Compact {
                 .chunks(32)
                 .map(|bits| bits.iter().enumerate().map(|(n, &bit)| u32::from(bit) << n).sum())
         });
-        let halves = self
-            .values
-            .iter()
-            .flatten()
-            .map(|row| row.map(|x| f16::from_f32(x).to_bits()));
         let bytes = write_compact(&CompactBasis {
             rest_positions: &self.rest,
-            faces: &self.faces,
+            surface: Surface::plain(self.rest.len(), &self.faces),
             bridges: &self.bridges,
             anchor_vertex: self.anchor,
             rotation_scale: ROTATION_SCALE,
@@ -175,7 +198,16 @@ impl Compact {
             blocks: &self.blocks,
             components: &components,
             support_bits: &words.collect::<Vec<u32>>(),
-            values: &halves.collect::<Vec<_>>(),
+            values: &self.whole,
+            after: After {
+                piece_of: &self.piece_of,
+                piece_offsets: &self.piece_offsets,
+                mix: &self.mix,
+                modes: &self.modes,
+                mode_scales: &MODE_SCALES,
+            },
+            prior: Prior::NONE,
+            encoder: &[],
             provenance: Provenance {
                 tool: "oracle",
                 sequence: "patches",
@@ -189,7 +221,6 @@ impl Compact {
                 steps: 0,
                 steps_run: 0,
             },
-            render: RenderMesh::NONE,
         })?;
         Ok(bytes)
     }
@@ -219,7 +250,7 @@ impl Compact {
                 for v in (0..self.rest.len()).filter(|&v| self.supports[k][v]) {
                     let value = values.next().expect("one row a bit");
                     for c in 0..FEATURE_COUNT {
-                        blended[v][c] += f64::from(weights[k]) * f64::from(VALUE_SCALE) * f64::from(value[c]);
+                        blended[v][c] += f64::from(weights[k]) * value[c];
                     }
                 }
             }
@@ -299,8 +330,24 @@ impl Compact {
         right.row_mut(anchor).copy_from(&self.rest(anchor).transpose());
         let solution = matrix.lu().solve(&right).expect("a connected mesh");
         (0..count)
-            .map(|v| solution.row(v).transpose().fixed_rows::<3>(0).into_owned())
+            .map(|v| solution.row(v).transpose().fixed_rows::<3>(0).into_owned() + self.added(v, weights))
             .collect()
+    }
+
+    /// What the weights add to vertex `v` after the solve.
+    fn added(&self, v: usize, weights: &[f32]) -> Vector3<f64> {
+        let mut sum = Vector3::zeros();
+        for (k, &weight) in weights.iter().enumerate() {
+            if self.piece_of[v] != NO_PIECE {
+                let offset = self.piece_offsets[2 * k + usize::from(self.piece_of[v])];
+                sum += f64::from(weight) * Vector3::from(offset.map(f64::from));
+            }
+            for (m, scale) in MODE_SCALES.iter().enumerate() {
+                let share = f64::from(self.mix[m * weights.len() + k]) * f64::from(*scale);
+                sum += f64::from(weight) * share * Vector3::from(self.modes[2 * v + m].map(f64::from));
+            }
+        }
+        sum
     }
 }
 

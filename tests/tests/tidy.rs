@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use sinew_tests::workspace_folder;
+use sinew_support::workspace_folder;
 
 /// A file longer than this holds two things.
 const LINES_MAX: usize = 500;
@@ -161,17 +161,18 @@ fn the_cores_name_neither_std_nor_alloc() {
         visited, in_formats,
         "every file of the package module is declared and was read"
     );
-    follow(
-        &root.join("runtime/src/lib.rs"),
-        &root.join("runtime/src"),
-        Allowed::default(),
-        &mut faults,
-        &mut visited,
-    );
-    assert_eq!(
-        visited,
-        in_formats + sources("runtime/src").len(),
-        "every file of the runtime is declared and was read"
-    );
+    let mut there = in_formats;
+    for core in ["runtime/src", "runtime/knobs/src"] {
+        let folder = root.join(core);
+        follow(
+            &folder.join("lib.rs"),
+            &folder,
+            Allowed::default(),
+            &mut faults,
+            &mut visited,
+        );
+        there += sources(core).len();
+        assert_eq!(visited, there, "every file of {core} is declared and was read");
+    }
     fail_with(faults);
 }

@@ -1,9 +1,9 @@
 //! The baked payload: everything the frame path reads, in the order it reads it. Written by the baker, opened by the
 //! runtime without allocating.
 //!
-//! Vertices carry three numbers: the source order (`vertex`) of positions, normals and faces; the order of decode and
-//! right-hand side (`lane`), in which what moves together stands together; and the elimination order of the factor
-//! (`solver`), in which the solve runs.
+//! Vertices carry three numbers: their place in the source (`vertex`); their place in the order of decoding (`slot`), in which
+//! what moves together stands together; and their place in the order of elimination (`solver`). Four solver places that follow
+//! each other are a `quad`.
 
 use rkyv::{
     Archive, ArchiveUnsized, Place, Serialize, SerializeUnsized,
@@ -13,12 +13,12 @@ use rkyv::{
     with::{ArchiveWith, InlineAsBox, SerializeWith},
 };
 
-use super::{FAN_VERTICES, FEATURE_COUNT, GROUP_NODES, RenderMesh};
+use super::{After, BakedBones, FEATURE_COUNT, GROUP_NODES, Indices, Prior, Surface, ValueScales};
 
-/// Nodes of a block, and rows and columns of a tile.
-pub const TILE_SIDE: usize = 4;
+/// Nodes of a quad, and rows and columns of a tile.
+pub const QUAD: usize = 4;
 /// Numbers of a tile.
-pub const TILE_ENTRIES: usize = TILE_SIDE * TILE_SIDE;
+pub const TILE_ENTRIES: usize = QUAD * QUAD;
 
 /// Archives a slice as [`InlineAsBox`] does, but starts it at a multiple of 64 bytes from the start of the file: a tile
 /// is a cache line where the package starts on one.
@@ -53,20 +53,11 @@ where
     }
 }
 
-/// The frame path's data: V vertices, F faces, B blocks, K components.
+/// The frame path's data: V vertices, F faces, B blocks, K components. At least one of the tiers is there.
 #[derive(Archive, Serialize, Debug)]
 pub struct BakedBasis<'a> {
     /// Content id of the compact package this was baked from.
     pub compact_id: [u8; 16],
-    /// Triangles in **source** order. Shape: `[F]`.
-    #[rkyv(with = InlineAsBox)]
-    pub faces: &'a [[u32; 3]],
-    /// Lane of each vertex in the exact tier. Shape: `[V]`, a permutation.
-    #[rkyv(with = InlineAsBox)]
-    pub lane_from_vertex: &'a [u32],
-    /// Shape: `[V]`, its inverse.
-    #[rkyv(with = InlineAsBox)]
-    pub vertex_from_lane: &'a [u32],
     /// Network value to log-rotation, radians. Positive.
     pub rotation_scale: f32,
     /// Network value to stretch. Positive.
@@ -77,115 +68,82 @@ pub struct BakedBasis<'a> {
     /// Components in block order. Shape: `[K]`.
     #[rkyv(with = InlineAsBox)]
     pub components: &'a [BakedComponent<'a>],
-    /// Compressed rows over `fans`, one for each [`FAN_VERTICES`] lanes of the exact tier, the last perhaps short.
+    /// Rest shape. Shape: `[V]`, slots.
+    #[rkyv(with = InlineAsBox)]
+    pub rest_positions: &'a [[f32; 3]],
+    /// Slot of each vertex. Shape: `[V]`, a permutation.
+    pub slot_from_vertex: Indices<'a>,
+    /// Shape: `[V]`, its inverse.
+    pub vertex_from_slot: Indices<'a>,
+    /// Triangles in the order of the source, and render vertices in the order of their slots. Points are slots.
+    pub surface: Surface<'a>,
+    /// Compressed rows over `fans`, one for each [`super::FAN_VERTICES`] slots, the last perhaps short.
     /// Shape: `[ceil(V / FAN_VERTICES) + 1]`, starts at 0, never falls.
     #[rkyv(with = InlineAsBox)]
     pub fan_offsets: &'a [u32],
-    /// Lanes of the exact tier. Each vertex's own column walks around it: two in succession and the vertex are a triangle,
-    /// and the vertex itself parts fans and fills up.
-    #[rkyv(with = InlineAsBox)]
-    pub fans: &'a [[u32; FAN_VERTICES]],
+    /// Slots. Each vertex's own column walks around it: two in succession and the vertex are a triangle, and the vertex
+    /// itself parts fans and fills up. Shape: `[steps][FAN_VERTICES]`.
+    pub fans: Indices<'a>,
     /// The tier whose nodes are the vertices: N = V.
-    pub exact: BakedTier<'a>,
-    /// A tier of fewer nodes, for crowds and small devices.
-    pub fast: Option<BakedFast<'a>>,
-    /// What an engine draws.
-    pub render: RenderMesh<'a>,
+    pub exact: Option<BakedExact<'a>>,
+    /// A few affine maps, for GPUs, crowds and small devices.
+    pub bones: Option<BakedBones<'a>>,
+    /// What is added to the positions of the exact tier, and fitted by the bones. Points are slots.
+    pub after: After<'a>,
+    /// What is known of the weights.
+    pub prior: Prior<'a>,
 }
 
-/// The fast tier: a graph of N nodes stands for the mesh, and each vertex follows four of them. A vertex at rest position r
-/// moves by `sum over its four nodes n of w_n (d_n + D_n (r - r_n))`, where d_n is the node's displacement, `D_n = T_n - I`
-/// its deformation gradient less identity and r_n its rest position.
+/// What a frame of the exact tier reads from decode to solve. Slots and solver places are those of the vertices.
 #[derive(Archive, Serialize, Debug, Clone, Copy)]
-pub struct BakedFast<'a> {
-    /// The nodes; ring weights may be negative here.
-    pub nodes: BakedTier<'a>,
-    /// Middle of the rest shape: gradients act about it, so that a mesh far from the origin loses no digits.
-    pub centre: [f32; 3],
-    /// The four nodes of each vertex, lanes of `nodes`. Shape: `[V]`, lanes of the exact tier.
-    #[rkyv(with = InlineAsBox)]
-    pub skin_nodes: &'a [[u16; SKIN_NODES]],
-    /// Their weights, in units of 1 / 65535; each row sums to 65535. Shape: `[V]`, lanes of the exact
-    /// tier.
-    #[rkyv(with = InlineAsBox)]
-    pub skin_weights: &'a [[u16; SKIN_NODES]],
-    /// How far the tier is from the exact one.
-    pub error: FastError,
+pub struct BakedExact<'a> {
+    /// The components at the vertices.
+    pub patches: BakedPatches<'a>,
+    /// Their system.
+    pub solve: BakedSolve<'a>,
 }
 
-/// Nodes that a vertex of the fast tier follows.
-pub const SKIN_NODES: usize = 4;
-
-/// What stands for 1 in [`BakedFast::skin_weights`].
-pub const SKIN_WEIGHT_SUM: u32 = u16::MAX as u32;
-
-/// How far the fast tier is from the exact one, measured when the package was baked. Distances are shares of the diagonal
-/// of the rest shape's bounding box. In *mixed* poses every control moves in a quarter of them, and stands anywhere
-/// between its stops, evenly; *single* ones put one control at one of its stops and leave the rest at zero.
-#[derive(Archive, Serialize, Debug, Clone, Copy, PartialEq)]
-pub struct FastError {
-    /// Root mean square distance, over all vertices of the mixed poses.
-    pub mixed_rms: f32,
-    /// 99 of 100 vertices of the mixed poses are nearer than this.
-    pub mixed_p99: f32,
-    /// Greatest distance in the mixed poses.
-    pub mixed_max: f32,
-    /// Root mean square distance, over all vertices of the single poses.
-    pub single_rms: f32,
-    /// Greatest distance in the single poses.
-    pub single_max: f32,
-    /// Root mean square angle between the normals of both tiers in the mixed poses, radians.
-    pub normal_rms: f32,
-    /// How many mixed poses there were.
-    pub mixed_poses: u32,
-}
-
-/// What a frame reads from decode to solve, for a set of N nodes: all vertices, or a graph that stands for them. Lanes number
-/// the nodes in the order of decoding, [`GROUP_NODES`] lanes a group, the last group perhaps short; solver indices in
-/// the tier's own order of elimination.
+/// The components at a set of N nodes, in the order of decoding: [`GROUP_NODES`] slots a group, the last group perhaps short.
 #[derive(Archive, Serialize, Debug, Clone, Copy)]
-pub struct BakedTier<'a> {
-    /// Rest shape of the nodes. Shape: `[N]`, lanes.
-    #[rkyv(with = InlineAsBox)]
-    pub rest_positions: &'a [[f32; 3]],
-    /// One-rings (with bridges) of the lanes, compressed rows. Shape: `[N + 1]`, starts at 0, never falls.
-    #[rkyv(with = InlineAsBox)]
-    pub ring_offsets: &'a [u32],
-    /// Lanes, ascending within a row, never the row itself. Shape: `[2 * edges]`.
-    #[rkyv(with = InlineAsBox)]
-    pub ring: &'a [u32],
-    /// Half the cotangent sum of each edge, symmetric, non-negative in the exact tier. Shape: that of `ring`.
-    #[rkyv(with = InlineAsBox)]
-    pub ring_weights: &'a [f32],
-    /// `L + anchor = F D F^T` in tiles of 4 x 4 over T = ceil(N / 4) blocks of solver indices: F is block unit lower
-    /// triangular, D block diagonal. Columns over `tile_rows`. Shape: `[T + 1]`, starts at 0, never falls.
-    #[rkyv(with = InlineAsBox)]
-    pub tile_offsets: &'a [u32],
-    /// Block of rows of each tile, ascending within a column, greater than the column.
-    #[rkyv(with = InlineAsBox)]
-    pub tile_rows: &'a [u32],
-    /// Tiles of F below its diagonal, row-major. Shape: that of `tile_rows`. Starts at a multiple of 64 bytes in the file.
-    #[rkyv(with = OnCacheLines)]
-    pub tiles: &'a [[f32; TILE_ENTRIES]],
-    /// `1 / D`: symmetric, row-major, zero where the last block has no node. Shape: `[T]`. Starts as `tiles` does.
-    #[rkyv(with = OnCacheLines)]
-    pub inverse_diagonals: &'a [[f32; TILE_ENTRIES]],
-    /// Solver index of each lane. Shape: `[N]`, a permutation.
-    #[rkyv(with = InlineAsBox)]
-    pub solver_from_lane: &'a [u32],
-    /// Shape: `[N]`, its inverse.
-    #[rkyv(with = InlineAsBox)]
-    pub lane_from_solver: &'a [u32],
+pub struct BakedPatches<'a> {
     /// Compressed rows over the patches, one a group; G = ceil(N / GROUP_NODES). Shape: `[G + 1]`, starts at 0, never falls.
     #[rkyv(with = InlineAsBox)]
-    pub patch_offsets: &'a [u32],
-    /// Component of each patch, ascending within a group, and the block it belongs to. Shape: `[T]`.
+    pub offsets: &'a [u32],
+    /// Component of each patch, ascending within a group, and the block it belongs to. Shape: `[patches]`.
     #[rkyv(with = InlineAsBox)]
-    pub patch_owners: &'a [[u16; 2]],
-    /// Folded values `point C_k + neighbour mean C_k` as IEEE half bits, times the component's `value_scale`; zero where the
-    /// component does not reach, and beyond the last node. Shape: `[T]` of `[9][GROUP_NODES]`.
+    pub owners: &'a [[u16; 2]],
+    /// Folded values `point C_k + neighbour mean C_k` as whole numbers, times the component's scales; zero where the
+    /// component does not reach, and beyond the last node. Shape: `[patches]` of `[9][GROUP_NODES]`.
     #[rkyv(with = InlineAsBox)]
-    pub patch_values: &'a [[[u16; GROUP_NODES]; FEATURE_COUNT]],
+    pub values: &'a [[[i16; GROUP_NODES]; FEATURE_COUNT]],
+}
+
+/// The linear system of a set of N nodes: right-hand side and factor, T = ceil(N / 4) quads of solver places.
+#[derive(Archive, Serialize, Debug, Clone, Copy)]
+pub struct BakedSolve<'a> {
+    /// One-rings (with bridges) of the slots, compressed rows. Shape: `[N + 1]`, starts at 0, never falls.
+    #[rkyv(with = InlineAsBox)]
+    pub ring_offsets: &'a [u32],
+    /// Slots, ascending within a row, never the row itself. Shape: `[2 * edges]`.
+    pub ring: Indices<'a>,
+    /// Half the cotangent sum of each edge, symmetric, non-negative. Shape: that of `ring`.
+    #[rkyv(with = InlineAsBox)]
+    pub ring_weights: &'a [f32],
+    /// `L + anchor = F D F^T` in tiles of 4 x 4: F is block unit lower triangular, D block diagonal. Columns over
+    /// `tile_rows`. Shape: `[T + 1]`, starts at 0, never falls.
+    #[rkyv(with = InlineAsBox)]
+    pub tile_offsets: &'a [u32],
+    /// Quad of rows of each tile, ascending within a column, greater than the column.
+    pub tile_rows: Indices<'a>,
+    /// Tiles of F below its diagonal, **column-major**. Shape: that of `tile_rows`. Starts at a multiple of 64 bytes in the
+    /// file.
+    #[rkyv(with = OnCacheLines)]
+    pub tiles: &'a [[f32; TILE_ENTRIES]],
+    /// `1 / D`: symmetric, zero where the last quad has no node. Shape: `[T]`. Starts as `tiles` does.
+    #[rkyv(with = OnCacheLines)]
+    pub inverse_diagonals: &'a [[f32; TILE_ENTRIES]],
+    /// Solver place of each slot. Shape: `[N]`, a permutation.
+    pub solver_from_slot: Indices<'a>,
 }
 
 /// One autoencoder block, folded: `x_v += tanh(bias + sum_k z_k C_k,v) - tanh(bias)` on its support.
@@ -215,6 +173,6 @@ pub struct BakedComponent<'a> {
     pub minimum: f32,
     /// Upper stop of the control; at least 0.
     pub maximum: f32,
-    /// Multiplies the half-precision values of every tier. Positive.
-    pub value_scale: f32,
+    /// Multiply the whole numbers of every tier.
+    pub value_scales: ValueScales,
 }

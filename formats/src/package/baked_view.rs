@@ -3,10 +3,12 @@
 use rkyv::{api::low::access, rancor::Failure};
 
 use super::{
-    ArchivedBakedBasis, ArchivedBakedFast, ArchivedBakedTier, BakedBlock, BakedComponent, FAN_VERTICES, FEATURE_COUNT,
-    FastError, GROUP_NODES, Header, OpenError, PackageKind, RenderMesh, SKIN_NODES, TILE_ENTRIES, TILE_SIDE,
-    open::{native, payload},
-    render, rules,
+    After, ArchivedBakedBasis, ArchivedBakedPatches, ArchivedBakedSolve, BakedBlock, BakedComponent, BonesView,
+    FEATURE_COUNT, Faces, GROUP_NODES, Header, IndexSlice, OpenError, PackageKind, Prior, SurfaceView, TILE_ENTRIES,
+    ValueScales,
+    archive::{native, payload},
+    indices::slice,
+    rules,
 };
 
 /// An opened baked package; borrows its bytes. Fields mean what [`super::BakedBasis`] says.
@@ -16,16 +18,36 @@ pub struct BakedView<'a> {
     archived: &'a ArchivedBakedBasis<'static>,
 }
 
-/// One tier of an opened baked package: N nodes. Fields mean what [`super::BakedTier`] says.
+/// The exact tier of an opened baked package. Fields mean what [`super::BakedExact`] says.
 #[derive(Clone, Copy)]
-pub struct TierView<'a> {
-    archived: &'a ArchivedBakedTier<'static>,
+pub struct ExactView<'a> {
+    /// The components at the vertices.
+    pub patches: PatchesView<'a>,
+    /// Their system.
+    pub solve: SolveView<'a>,
 }
 
-/// The fast tier of an opened baked package. Fields mean what [`super::BakedFast`] says.
-#[derive(Clone, Copy)]
-pub struct FastView<'a> {
-    archived: &'a ArchivedBakedFast<'static>,
+/// The components at N nodes. Fields mean what [`super::BakedPatches`] says, and keep its promises.
+#[derive(Clone, Copy, Debug)]
+#[expect(missing_docs, reason = "fields are those of BakedPatches")]
+pub struct PatchesView<'a> {
+    pub offsets: &'a [u32],
+    pub owners: &'a [[u16; 2]],
+    pub values: &'a [[[i16; GROUP_NODES]; FEATURE_COUNT]],
+}
+
+/// The linear system of N nodes. Fields mean what [`super::BakedSolve`] says, and keep its promises.
+#[derive(Clone, Copy, Debug)]
+#[expect(missing_docs, reason = "fields are those of BakedSolve")]
+pub struct SolveView<'a> {
+    pub ring_offsets: &'a [u32],
+    pub ring: IndexSlice<'a>,
+    pub ring_weights: &'a [f32],
+    pub tile_offsets: &'a [u32],
+    pub tile_rows: IndexSlice<'a>,
+    pub tiles: &'a [[f32; TILE_ENTRIES]],
+    pub inverse_diagonals: &'a [[f32; TILE_ENTRIES]],
+    pub solver_from_slot: IndexSlice<'a>,
 }
 
 impl<'a> BakedView<'a> {
@@ -57,7 +79,7 @@ impl<'a> BakedView<'a> {
 
     /// V, at least 3.
     pub fn vertex_count(&self) -> usize {
-        self.archived.lane_from_vertex.len()
+        self.archived.rest_positions.len()
     }
 
     /// B, at least 1.
@@ -70,19 +92,29 @@ impl<'a> BakedView<'a> {
         self.archived.components.len()
     }
 
-    /// Source order. Shape: `[F]`, each index < V.
-    pub fn faces(&self) -> &'a [[u32; 3]] {
-        native(&self.archived.faces)
+    /// Slots, finite. Shape: `[V]`.
+    pub fn rest_positions(&self) -> &'a [[f32; 3]] {
+        native(&self.archived.rest_positions)
     }
 
     /// Shape: `[V]`, a permutation.
-    pub fn lane_from_vertex(&self) -> &'a [u32] {
-        native(&self.archived.lane_from_vertex)
+    pub fn slot_from_vertex(&self) -> IndexSlice<'a> {
+        slice(&self.archived.slot_from_vertex)
     }
 
     /// Shape: `[V]`, its inverse.
-    pub fn vertex_from_lane(&self) -> &'a [u32] {
-        native(&self.archived.vertex_from_lane)
+    pub fn vertex_from_slot(&self) -> IndexSlice<'a> {
+        slice(&self.archived.vertex_from_slot)
+    }
+
+    /// Triangles and what an engine draws; points are slots.
+    pub fn surface(&self) -> SurfaceView<'a> {
+        SurfaceView::new(&self.archived.surface)
+    }
+
+    /// Triangles by vertices, source order. Shape: `[F]`, each corner < V.
+    pub fn faces(&self) -> Faces<'a> {
+        self.surface().faces().renamed(self.vertex_from_slot())
     }
 
     /// Network value to log-rotation, radians, positive.
@@ -121,7 +153,10 @@ impl<'a> BakedView<'a> {
             block: component.block.to_native(),
             minimum: component.minimum.to_native(),
             maximum: component.maximum.to_native(),
-            value_scale: component.value_scale.to_native(),
+            value_scales: ValueScales {
+                rotation: component.value_scales.rotation.to_native(),
+                stretch: component.value_scales.stretch.to_native(),
+            },
         }
     }
 
@@ -136,157 +171,70 @@ impl<'a> BakedView<'a> {
         native(&self.archived.fan_offsets)
     }
 
-    /// Lanes of the exact tier, < V.
-    pub fn fans(&self) -> &'a [[u32; FAN_VERTICES]] {
-        native(&self.archived.fans)
+    /// Slots, < V. Shape: `[steps][FAN_VERTICES]`.
+    pub fn fans(&self) -> IndexSlice<'a> {
+        slice(&self.archived.fans)
     }
 
-    /// The tier whose nodes are the vertices.
-    pub fn exact(&self) -> TierView<'a> {
-        TierView {
-            archived: &self.archived.exact,
-        }
+    /// The tier whose nodes are the vertices, where the package has it.
+    pub fn exact(&self) -> Option<ExactView<'a>> {
+        self.archived.exact.as_ref().map(|exact| ExactView {
+            patches: PatchesView::new(&exact.patches),
+            solve: SolveView::new(&exact.solve),
+        })
     }
 
-    /// The tier of fewer nodes, where the package has one.
-    pub fn fast(&self) -> Option<FastView<'a>> {
-        self.archived.fast.as_ref().map(|archived| FastView { archived })
+    /// The bones, where the package has them.
+    pub fn bones(&self) -> Option<BonesView<'a>> {
+        self.archived.bones.as_ref().map(BonesView::new)
     }
 
-    /// What an engine draws; all empty where the source has no texture coordinates.
-    pub fn render_mesh(&self) -> RenderMesh<'a> {
-        render::view(&self.archived.render)
+    /// What is added to the positions of the exact tier; points are slots.
+    pub fn after(&self) -> After<'a> {
+        After::view(&self.archived.after)
+    }
+
+    /// What is known of the weights.
+    pub fn prior(&self) -> Prior<'a> {
+        Prior::view(&self.archived.prior)
     }
 }
 
-impl<'a> FastView<'a> {
-    /// The nodes and all that decode and solve read.
-    pub fn nodes(&self) -> TierView<'a> {
-        TierView {
-            archived: &self.archived.nodes,
-        }
-    }
-
-    /// What gradients act about.
-    pub fn centre(&self) -> [f32; 3] {
-        bytemuck::cast(self.archived.centre)
-    }
-
-    /// Lanes of the nodes, each < N. Shape: `[V]`, lanes of the exact tier.
-    pub fn skin_nodes(&self) -> &'a [[u16; SKIN_NODES]] {
-        native(&self.archived.skin_nodes)
-    }
-
-    /// Each row sums to [`SKIN_WEIGHT_SUM`](super::SKIN_WEIGHT_SUM). Shape: `[V]`, lanes of the exact tier.
-    pub fn skin_weights(&self) -> &'a [[u16; SKIN_NODES]] {
-        native(&self.archived.skin_weights)
-    }
-
-    /// How far the tier is from the exact one.
-    pub fn error(&self) -> FastError {
-        let error = &self.archived.error;
-        FastError {
-            mixed_rms: error.mixed_rms.to_native(),
-            mixed_p99: error.mixed_p99.to_native(),
-            mixed_max: error.mixed_max.to_native(),
-            single_rms: error.single_rms.to_native(),
-            single_max: error.single_max.to_native(),
-            normal_rms: error.normal_rms.to_native(),
-            mixed_poses: error.mixed_poses.to_native(),
+impl<'a> SolveView<'a> {
+    fn new(archived: &'a ArchivedBakedSolve<'static>) -> Self {
+        Self {
+            ring_offsets: native(&archived.ring_offsets),
+            ring: slice(&archived.ring),
+            ring_weights: native(&archived.ring_weights),
+            tile_offsets: native(&archived.tile_offsets),
+            tile_rows: slice(&archived.tile_rows),
+            tiles: native(&archived.tiles),
+            inverse_diagonals: native(&archived.inverse_diagonals),
+            solver_from_slot: slice(&archived.solver_from_slot),
         }
     }
 }
 
-impl<'a> TierView<'a> {
-    /// N, at least 1; V in the exact tier.
-    pub fn node_count(&self) -> usize {
-        self.archived.rest_positions.len()
-    }
-
-    /// Lanes, finite. Shape: `[N]`.
-    pub fn rest_positions(&self) -> &'a [[f32; 3]] {
-        native(&self.archived.rest_positions)
-    }
-
-    /// Shape: `[N + 1]`, from 0 to `ring().len()`, never falls.
-    pub fn ring_offsets(&self) -> &'a [u32] {
-        native(&self.archived.ring_offsets)
-    }
-
-    /// Lanes < N, ascending within a row, never the row itself.
-    pub fn ring(&self) -> &'a [u32] {
-        native(&self.archived.ring)
-    }
-
-    /// Shape: that of `ring`; finite, symmetric, non-negative in the exact tier.
-    pub fn ring_weights(&self) -> &'a [f32] {
-        native(&self.archived.ring_weights)
-    }
-
-    /// T, the blocks of four nodes that the factor's tiles stand on; the last one may be short.
-    pub fn tile_column_count(&self) -> usize {
-        self.node_count().div_ceil(TILE_SIDE)
-    }
-
-    /// Shape: `[T + 1]`, from 0 to `tile_rows().len()`, never falls.
-    pub fn tile_offsets(&self) -> &'a [u32] {
-        native(&self.archived.tile_offsets)
-    }
-
-    /// Blocks < T, ascending within a column, greater than the column.
-    pub fn tile_rows(&self) -> &'a [u32] {
-        native(&self.archived.tile_rows)
-    }
-
-    /// Shape: that of `tile_rows`; finite.
-    pub fn tiles(&self) -> &'a [[f32; TILE_ENTRIES]] {
-        native(&self.archived.tiles)
-    }
-
-    /// Shape: `[T]`; finite, positive on the diagonal of every node.
-    pub fn inverse_diagonals(&self) -> &'a [[f32; TILE_ENTRIES]] {
-        native(&self.archived.inverse_diagonals)
-    }
-
-    /// Shape: `[N]`, a permutation.
-    pub fn solver_from_lane(&self) -> &'a [u32] {
-        native(&self.archived.solver_from_lane)
-    }
-
-    /// Shape: `[N]`, its inverse.
-    pub fn lane_from_solver(&self) -> &'a [u32] {
-        native(&self.archived.lane_from_solver)
-    }
-
-    /// Shape: `[ceil(N / GROUP_NODES) + 1]`, from 0 to `patch_owners().len()`, never falls.
-    pub fn patch_offsets(&self) -> &'a [u32] {
-        native(&self.archived.patch_offsets)
-    }
-
-    /// Component < K and its block, ascending within a group. Shape: `[T]`.
-    pub fn patch_owners(&self) -> &'a [[u16; 2]] {
-        native(&self.archived.patch_owners)
-    }
-
-    /// Half bits, finite. Shape: `[T]`.
-    pub fn patch_values(&self) -> &'a [[[u16; GROUP_NODES]; FEATURE_COUNT]] {
-        native(&self.archived.patch_values)
+impl<'a> PatchesView<'a> {
+    pub(super) fn new(archived: &'a ArchivedBakedPatches<'static>) -> Self {
+        Self {
+            offsets: native(&archived.offsets),
+            owners: native(&archived.owners),
+            values: native(&archived.values),
+        }
     }
 
     /// What the patches hold that is not zero, group by group.
-    pub fn entries(&self) -> impl Iterator<Item = TierEntry> + use<'a> {
-        /// Without the sign: both zeros are zero.
-        const MAGNITUDE: u16 = 0x7fff;
-        let tier = *self;
-        let patches = tier.patch_offsets().windows(2).enumerate();
-        let patches = patches.flat_map(|(g, row)| (row[0] as usize..row[1] as usize).map(move |p| (g, p)));
-        let lanes = patches.flat_map(|(g, p)| (0..GROUP_NODES).map(move |n| (g * GROUP_NODES + n, p, n)));
-        lanes.filter_map(move |(lane, p, n)| {
-            let values = tier.patch_values()[p].map(|row| row[n]);
-            let moves = lane < tier.node_count() && values.iter().any(|half| half & MAGNITUDE != 0);
-            moves.then_some(TierEntry {
-                component: usize::from(tier.patch_owners()[p][0]),
-                lane,
+    pub fn entries(&self) -> impl Iterator<Item = PatchEntry> + use<'a> {
+        let patches = *self;
+        let rows = patches.offsets.windows(2).enumerate();
+        let places = rows.flat_map(|(g, row)| (row[0] as usize..row[1] as usize).map(move |p| (g, p)));
+        let places = places.flat_map(|(g, p)| (0..GROUP_NODES).map(move |n| (g * GROUP_NODES + n, p, n)));
+        places.filter_map(move |(slot, p, n)| {
+            let values = patches.values[p].map(|row| row[n]);
+            (values != [0; FEATURE_COUNT]).then_some(PatchEntry {
+                component: usize::from(patches.owners[p][0]),
+                slot,
                 values,
             })
         })
@@ -294,12 +242,12 @@ impl<'a> TierView<'a> {
 }
 
 /// Where one component moves one node of a tier.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TierEntry {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PatchEntry {
     /// k < K.
     pub component: usize,
     /// < N.
-    pub lane: usize,
-    /// Half bits; times the component's `value_scale`.
-    pub values: [u16; FEATURE_COUNT],
+    pub slot: usize,
+    /// Times the component's scales.
+    pub values: [i16; FEATURE_COUNT],
 }

@@ -60,13 +60,6 @@ pub enum OpenError {
         /// The alignment, in bytes.
         required: usize,
     },
-    /// The payload's checksum does not fit.
-    PayloadCorrupt {
-        /// Checksum in the header.
-        expected: u32,
-        /// Checksum of the payload.
-        actual: u32,
-    },
     /// The content id in the header is not the payload's.
     ContentIdMismatch,
     /// The payload is not an archive of its kind: a pointer, a length or a string is wrong.
@@ -175,18 +168,20 @@ pub enum OpenError {
         /// Element.
         index: usize,
     },
-    /// The weights of a vertex in the fast tier do not sum to one.
+    /// The skin weights of a vertex do not sum to one.
     SkinWeightSum {
-        /// Lane of the exact tier.
-        lane: usize,
+        /// Slot of the vertex.
+        slot: usize,
         /// Their sum, in units of 1 / 65535.
         sum: u32,
     },
-    /// A triangle of render vertices is not the triangle it should be.
-    RenderFaceDiffers {
-        /// Triangle.
-        face: usize,
+    /// Indices are wider or narrower than the count of what they number asks for.
+    IndexWidth {
+        /// Field.
+        field: &'static str,
     },
+    /// A baked package without a tier plays nothing.
+    NoTier,
     /// A bit beyond the last vertex is set.
     BitmapTail {
         /// Component.
@@ -269,11 +264,10 @@ impl fmt::Display for OpenError {
                     "the package must start at a multiple of {required} bytes in memory"
                 )
             }
-            Self::PayloadCorrupt { expected, actual } => write!(
+            Self::ContentIdMismatch => write!(
                 out,
-                "the package is damaged (checksum {actual:08x}, should be {expected:08x}); copy the file again"
+                "the package is damaged: its content is not what its header names; copy the file again"
             ),
-            Self::ContentIdMismatch => write!(out, "the package's content id is not that of its content"),
             Self::Malformed => write!(out, "the package's payload is not a valid archive"),
             Self::NotFinite { field, index } => write!(out, "`{field}` {index} is not a finite number"),
             Self::OutOfRange {
@@ -326,13 +320,14 @@ impl fmt::Display for OpenError {
                     "`{field}` {index} differs from the same edge in the other direction"
                 )
             }
-            Self::SkinWeightSum { lane, sum } => {
-                write!(out, "the skin weights of lane {lane} sum to {sum} and not to 65535")
+            Self::SkinWeightSum { slot, sum } => {
+                write!(out, "the skin weights of slot {slot} sum to {sum} and not to 65535")
             }
-            Self::RenderFaceDiffers { face } => write!(
+            Self::IndexWidth { field } => write!(
                 out,
-                "render triangle {face} does not stand for the corners of triangle {face}"
+                "`{field}` must be 16 bits wide for at most 65536 things, and 32 bits for more"
             ),
+            Self::NoTier => write!(out, "the package has no tier to play"),
             Self::BitmapTail { component } => {
                 write!(
                     out,

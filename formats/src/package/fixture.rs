@@ -6,18 +6,18 @@
 
 use alloc::vec::Vec;
 
-use half::f16;
+mod after;
+mod bones;
+mod surface;
 
-mod fast;
-mod render;
-
-pub use fast::TinyFast;
-pub use render::TinyRender;
+pub use after::{TinyAfter, TinyPrior};
+pub use bones::TinyBones;
+pub use surface::TinySurface;
 
 use super::{
-    BakedBasis, BakedBlock, BakedComponent, BakedTier, BlockRecord, CompactBasis, ComponentRecord, FAN_VERTICES,
-    FEATURE_COUNT, Fans, GraphConvRecord, Header, NONE, PackageKind, Patch, Patches, Provenance, Quality, TILE_ENTRIES,
-    TILE_SIDE, write_compact,
+    BakedBasis, BakedBlock, BakedComponent, BakedExact, BakedSolve, BlockRecord, CompactBasis, ComponentRecord,
+    FAN_VERTICES, FEATURE_COUNT, Fans, GraphConvRecord, Header, Indices, NONE, PackageKind, Patches, Provenance, QUAD,
+    Quality, TILE_ENTRIES, ValueScales, write_compact,
 };
 
 /// V of the grid.
@@ -25,7 +25,7 @@ pub const VERTEX_COUNT: usize = 9;
 /// K: two coarse components, one fine component on each.
 pub const COMPONENT_COUNT: usize = 4;
 /// Order of decoding: the elimination order backwards, which takes the middle of the grid last.
-pub const VERTEX_FROM_LANE: [u32; VERTEX_COUNT] = [4, 7, 5, 3, 1, 8, 6, 2, 0];
+pub const VERTEX_FROM_SLOT: [u32; VERTEX_COUNT] = [4, 7, 5, 3, 1, 8, 6, 2, 0];
 /// The vertex that the solve holds.
 pub const ANCHOR_VERTEX: u32 = 0;
 
@@ -34,7 +34,7 @@ pub const ANCHOR_VERTEX: u32 = 0;
 #[expect(missing_docs, reason = "fields are those of CompactBasis")]
 pub struct TinyCompact {
     pub rest_positions: Vec<[f32; 3]>,
-    pub faces: Vec<[u32; 3]>,
+    pub surface: TinySurface,
     pub bridges: Vec<[u32; 2]>,
     pub anchor_vertex: u32,
     pub rotation_scale: f32,
@@ -42,10 +42,12 @@ pub struct TinyCompact {
     pub blocks: Vec<BlockRecord>,
     pub components: Vec<ComponentRecord<'static>>,
     pub support_bits: Vec<u32>,
-    pub values: Vec<[u16; FEATURE_COUNT]>,
+    pub values: Vec<[i16; FEATURE_COUNT]>,
+    pub after: TinyAfter,
+    pub prior: TinyPrior,
+    pub encoder: Vec<u8>,
     pub provenance: Provenance<'static>,
     pub quality: Quality,
-    pub render: TinyRender,
 }
 
 /// Owns what a [`BakedBasis`] borrows; a test changes a field and writes.
@@ -53,25 +55,28 @@ pub struct TinyCompact {
 #[expect(missing_docs, reason = "fields are those of BakedBasis")]
 pub struct TinyBaked {
     pub compact_id: [u8; 16],
-    pub faces: Vec<[u32; 3]>,
-    pub lane_from_vertex: Vec<u32>,
-    pub vertex_from_lane: Vec<u32>,
     pub rotation_scale: f32,
     pub stretch_scale: f32,
     pub blocks: Vec<BakedBlock>,
     pub components: Vec<BakedComponent<'static>>,
+    pub rest_positions: Vec<[f32; 3]>,
+    pub slot_from_vertex: Vec<u32>,
+    pub vertex_from_slot: Vec<u32>,
+    pub surface: TinySurface,
     pub fan_offsets: Vec<u32>,
     pub fans: Vec<[u32; FAN_VERTICES]>,
     pub exact: TinyTier,
-    pub fast: Option<TinyFast>,
-    pub render: TinyRender,
+    pub has_exact: bool,
+    pub bones: Option<TinyBones>,
+    pub after: TinyAfter,
+    pub prior: TinyPrior,
 }
 
-/// Owns what a [`BakedTier`] borrows.
+/// Owns what a [`BakedExact`] borrows: patches, and a [`BakedSolve`].
 #[derive(Debug, Clone, Default)]
-#[expect(missing_docs, reason = "fields are those of BakedTier")]
+#[expect(missing_docs, reason = "fields are those of BakedPatches and BakedSolve")]
 pub struct TinyTier {
-    pub rest_positions: Vec<[f32; 3]>,
+    pub patches: Patches,
     pub ring_offsets: Vec<u32>,
     pub ring: Vec<u32>,
     pub ring_weights: Vec<f32>,
@@ -79,11 +84,7 @@ pub struct TinyTier {
     pub tile_rows: Vec<u32>,
     pub tiles: Vec<[f32; TILE_ENTRIES]>,
     pub inverse_diagonals: Vec<[f32; TILE_ENTRIES]>,
-    pub solver_from_lane: Vec<u32>,
-    pub lane_from_solver: Vec<u32>,
-    pub patch_offsets: Vec<u32>,
-    pub patch_owners: Vec<[u16; 2]>,
-    pub patch_values: Vec<Patch>,
+    pub solver_from_slot: Vec<u32>,
 }
 
 impl TinyCompact {
@@ -91,7 +92,7 @@ impl TinyCompact {
     pub fn basis(&self) -> CompactBasis<'_> {
         CompactBasis {
             rest_positions: &self.rest_positions,
-            faces: &self.faces,
+            surface: self.surface.record(self.rest_positions.len()),
             bridges: &self.bridges,
             anchor_vertex: self.anchor_vertex,
             rotation_scale: self.rotation_scale,
@@ -100,9 +101,11 @@ impl TinyCompact {
             components: &self.components,
             support_bits: &self.support_bits,
             values: &self.values,
+            after: self.after.record(),
+            prior: self.prior.record(),
+            encoder: &self.encoder,
             provenance: self.provenance,
             quality: self.quality,
-            render: self.render.mesh(),
         }
     }
 }
@@ -110,40 +113,41 @@ impl TinyCompact {
 impl TinyBaked {
     /// Borrowed, ready to be written.
     pub fn basis(&self) -> BakedBasis<'_> {
+        let vertex_count = self.rest_positions.len();
         BakedBasis {
             compact_id: self.compact_id,
-            faces: &self.faces,
-            lane_from_vertex: &self.lane_from_vertex,
-            vertex_from_lane: &self.vertex_from_lane,
             rotation_scale: self.rotation_scale,
             stretch_scale: self.stretch_scale,
             blocks: &self.blocks,
             components: &self.components,
+            rest_positions: &self.rest_positions,
+            slot_from_vertex: Indices::of(vertex_count, &self.slot_from_vertex),
+            vertex_from_slot: Indices::of(vertex_count, &self.vertex_from_slot),
+            surface: self.surface.record(vertex_count),
             fan_offsets: &self.fan_offsets,
-            fans: &self.fans,
-            exact: self.exact.tier(),
-            fast: self.fast.as_ref().map(TinyFast::fast),
-            render: self.render.mesh(),
+            fans: Indices::of(vertex_count, self.fans.as_flattened()),
+            exact: self.has_exact.then(|| BakedExact {
+                patches: self.exact.patches.record(),
+                solve: self.exact.solve(vertex_count),
+            }),
+            bones: self.bones.as_ref().map(TinyBones::record),
+            after: self.after.record(),
+            prior: self.prior.record(),
         }
     }
 }
 
 impl TinyTier {
-    fn tier(&self) -> BakedTier<'_> {
-        BakedTier {
-            rest_positions: &self.rest_positions,
+    fn solve(&self, node_count: usize) -> BakedSolve<'_> {
+        BakedSolve {
             ring_offsets: &self.ring_offsets,
-            ring: &self.ring,
+            ring: Indices::of(node_count, &self.ring),
             ring_weights: &self.ring_weights,
             tile_offsets: &self.tile_offsets,
-            tile_rows: &self.tile_rows,
+            tile_rows: Indices::of(node_count, &self.tile_rows),
             tiles: &self.tiles,
             inverse_diagonals: &self.inverse_diagonals,
-            solver_from_lane: &self.solver_from_lane,
-            lane_from_solver: &self.lane_from_solver,
-            patch_offsets: &self.patch_offsets,
-            patch_owners: &self.patch_owners,
-            patch_values: &self.patch_values,
+            solver_from_slot: Indices::of(node_count, &self.solver_from_slot),
         }
     }
 }
@@ -167,21 +171,24 @@ pub fn tiny_compact() -> TinyCompact {
         locality: 0.875,
         minimum: -1.5,
         maximum: 2.0,
-        value_scale: 0.5,
+        value_scales: ValueScales {
+            rotation: 0.5 / 65_536.0,
+            stretch: 0.25 / 65_536.0,
+        },
     };
     // Rows 0 and 1 of the grid; rows 1 and 2; a corner each.
     let supports: [&[usize]; COMPONENT_COUNT] = [&[0, 1, 2, 3, 4, 5], &[3, 4, 5, 6, 7, 8], &[1, 2], &[6, 7]];
     let values = supports.iter().enumerate().flat_map(|(k, support)| {
         support.iter().map(move |&v| {
             core::array::from_fn(|i| {
-                let step = ((3 * k + 5 * v + 7 * i) % 17) as f32;
-                f16::from_f32((step - 8.0) / 16.0).to_bits()
+                let step = ((3 * k + 5 * v + 7 * i) % 17) as i16;
+                4000 * (step - 8)
             })
         })
     });
     TinyCompact {
         rest_positions: rest_positions(),
-        faces: faces(),
+        surface: TinySurface::with_seam(&rest_positions(), &faces()),
         bridges: alloc::vec![[0, 8]],
         anchor_vertex: ANCHOR_VERTEX,
         rotation_scale: 0.75,
@@ -198,6 +205,9 @@ pub fn tiny_compact() -> TinyCompact {
             .map(|support| support.iter().map(|v| 1 << v).sum())
             .collect(),
         values: values.collect(),
+        after: TinyAfter::of_the_grid(),
+        prior: TinyPrior::of_the_grid(),
+        encoder: alloc::vec![1, 2, 3],
         provenance: Provenance {
             tool: "hand-made",
             sequence: "grid",
@@ -211,7 +221,6 @@ pub fn tiny_compact() -> TinyCompact {
             steps: 30,
             steps_run: 40,
         },
-        render: TinyRender::with_seam(&rest_positions(), &faces()),
     }
 }
 
@@ -219,42 +228,46 @@ pub fn tiny_compact() -> TinyCompact {
 pub fn tiny_baked() -> TinyBaked {
     let compact = tiny_compact();
     let weights = edge_weights();
-    let lane_from_vertex: Vec<u32> = (0..VERTEX_COUNT as u32)
-        .map(|vertex| VERTEX_FROM_LANE.iter().position(|&v| v == vertex).unwrap_or_default() as u32)
+    let slot_from_vertex: Vec<u32> = (0..VERTEX_COUNT as u32)
+        .map(|vertex| VERTEX_FROM_SLOT.iter().position(|&v| v == vertex).unwrap_or_default() as u32)
         .collect();
     let mut exact = TinyTier {
-        rest_positions: VERTEX_FROM_LANE.map(|v| compact.rest_positions[v as usize]).to_vec(),
         ring_offsets: alloc::vec![0],
-        solver_from_lane: (0..VERTEX_COUNT as u32).rev().collect(),
-        lane_from_solver: (0..VERTEX_COUNT as u32).rev().collect(),
+        solver_from_slot: (0..VERTEX_COUNT as u32).rev().collect(),
         ..TinyTier::default()
     };
     for row in 0..VERTEX_COUNT {
         for column in 0..VERTEX_COUNT {
-            if let Some(weight) = weights[VERTEX_FROM_LANE[row] as usize][VERTEX_FROM_LANE[column] as usize] {
+            if let Some(weight) = weights[VERTEX_FROM_SLOT[row] as usize][VERTEX_FROM_SLOT[column] as usize] {
                 exact.ring.push(column as u32);
                 exact.ring_weights.push(weight);
             }
         }
         exact.ring_offsets.push(exact.ring.len() as u32);
     }
-    factorize(&mut exact, lane_from_vertex[ANCHOR_VERTEX as usize] as usize);
-    fold(&compact, &mut exact);
-    let fans = Fans::gather(&compact.faces, &lane_from_vertex);
+    factorize(&mut exact, slot_from_vertex[ANCHOR_VERTEX as usize] as usize);
+    let scales = fold(&compact, &mut exact);
+    let fans = Fans::gather(&faces(), &slot_from_vertex);
+    let components = compact.components.iter().zip(scales);
     TinyBaked {
         compact_id: compact_id(&compact),
-        faces: compact.faces.clone(),
-        lane_from_vertex,
-        vertex_from_lane: VERTEX_FROM_LANE.to_vec(),
         rotation_scale: compact.rotation_scale,
         stretch_scale: compact.stretch_scale,
         blocks: compact.blocks.iter().map(baked_block).collect(),
-        components: compact.components.iter().map(baked_component).collect(),
+        components: components
+            .map(|(component, scales)| baked_component(component, scales))
+            .collect(),
+        rest_positions: VERTEX_FROM_SLOT.map(|v| compact.rest_positions[v as usize]).to_vec(),
+        surface: compact.surface.in_slots(&slot_from_vertex),
+        slot_from_vertex,
+        vertex_from_slot: VERTEX_FROM_SLOT.to_vec(),
         fan_offsets: fans.fan_offsets,
         fans: fans.fans,
         exact,
-        fast: None,
-        render: compact.render.clone(),
+        has_exact: true,
+        bones: None,
+        after: compact.after.in_slots(),
+        prior: compact.prior,
     }
 }
 
@@ -268,25 +281,25 @@ fn baked_block(block: &BlockRecord) -> BakedBlock {
     }
 }
 
-fn baked_component(component: &ComponentRecord<'static>) -> BakedComponent<'static> {
+fn baked_component(component: &ComponentRecord<'static>, value_scales: ValueScales) -> BakedComponent<'static> {
     BakedComponent {
         name: component.name,
         block: component.block,
         minimum: component.minimum,
         maximum: component.maximum,
-        value_scale: component.value_scale,
+        value_scales,
     }
 }
 
-/// The Laplacian, with 1 added at the anchor (a lane), to `F D F^T` by blocks, dense.
+/// The Laplacian, with 1 added at the anchor (a slot), to `F D F^T` by blocks, dense.
 fn factorize(tier: &mut TinyTier, anchor: usize) {
-    const BLOCK_COUNT: usize = VERTEX_COUNT.div_ceil(TILE_SIDE);
-    // Where the last block has no node it has a node of its own, so that it can be inverted.
-    let mut lower = [[0.0_f64; BLOCK_COUNT * TILE_SIDE]; BLOCK_COUNT * TILE_SIDE];
-    let solver = |lane: usize| tier.solver_from_lane[lane] as usize;
-    for lane in 0..VERTEX_COUNT {
-        let row = solver(lane);
-        for entry in tier.ring_offsets[lane] as usize..tier.ring_offsets[lane + 1] as usize {
+    const QUAD_COUNT: usize = VERTEX_COUNT.div_ceil(QUAD);
+    // Where the last quad has no node it has a node of its own, so that it can be inverted.
+    let mut lower = [[0.0_f64; QUAD_COUNT * QUAD]; QUAD_COUNT * QUAD];
+    let solver = |slot: usize| tier.solver_from_slot[slot] as usize;
+    for slot in 0..VERTEX_COUNT {
+        let row = solver(slot);
+        for entry in tier.ring_offsets[slot] as usize..tier.ring_offsets[slot + 1] as usize {
             let weight = f64::from(tier.ring_weights[entry]);
             lower[row][row] += weight;
             lower[row][solver(tier.ring[entry] as usize)] -= weight;
@@ -297,30 +310,30 @@ fn factorize(tier: &mut TinyTier, anchor: usize) {
         entries[row] = 1.0;
     }
     tier.tile_offsets.push(0);
-    for column in 0..BLOCK_COUNT {
-        let own = column * TILE_SIDE..(column + 1) * TILE_SIDE;
+    for column in 0..QUAD_COUNT {
+        let own = column * QUAD..(column + 1) * QUAD;
         let inverse = inverse(core::array::from_fn(|r| {
             core::array::from_fn(|c| lower[own.start + r][own.start + c])
         }));
         tier.inverse_diagonals.push(core::array::from_fn(|n| {
-            let (r, c) = (n / TILE_SIDE, n % TILE_SIDE);
+            let (r, c) = (n / QUAD, n % QUAD);
             let is_node = own.start + r.max(c) < VERTEX_COUNT;
             if is_node { inverse[r][c] as f32 } else { 0.0 }
         }));
-        let rest = own.end..BLOCK_COUNT * TILE_SIDE;
+        let rest = own.end..QUAD_COUNT * QUAD;
         let before = lower;
         for row in rest.clone() {
-            for c in 0..TILE_SIDE {
-                lower[row][own.start + c] = (0..TILE_SIDE).map(|n| before[row][own.start + n] * inverse[n][c]).sum();
+            for c in 0..QUAD {
+                lower[row][own.start + c] = (0..QUAD).map(|n| before[row][own.start + n] * inverse[n][c]).sum();
             }
             for other in rest.clone() {
                 let update = own.clone().map(|n| lower[row][n] * before[other][n]);
                 lower[row][other] -= update.sum::<f64>();
             }
         }
-        for row in column + 1..BLOCK_COUNT {
+        for row in column + 1..QUAD_COUNT {
             let tile: [f32; TILE_ENTRIES] =
-                core::array::from_fn(|n| lower[row * TILE_SIDE + n / TILE_SIDE][own.start + n % TILE_SIDE] as f32);
+                core::array::from_fn(|n| lower[row * QUAD + n % QUAD][own.start + n / QUAD] as f32);
             if tile != [0.0; TILE_ENTRIES] {
                 tier.tile_rows.push(row as u32);
                 tier.tiles.push(tile);
@@ -331,16 +344,16 @@ fn factorize(tier: &mut TinyTier, anchor: usize) {
 }
 
 /// Gauss and Jordan's, of a positive definite matrix.
-fn inverse(mut matrix: [[f64; TILE_SIDE]; TILE_SIDE]) -> [[f64; TILE_SIDE]; TILE_SIDE] {
-    for n in 0..TILE_SIDE {
+fn inverse(mut matrix: [[f64; QUAD]; QUAD]) -> [[f64; QUAD]; QUAD] {
+    for n in 0..QUAD {
         let pivot = matrix[n][n];
         matrix[n][n] = 1.0;
         matrix[n] = matrix[n].map(|value| value / pivot);
         let row = matrix[n];
-        for other in (0..TILE_SIDE).filter(|&other| other != n) {
+        for other in (0..QUAD).filter(|&other| other != n) {
             let share = matrix[other][n];
             matrix[other][n] = 0.0;
-            for c in 0..TILE_SIDE {
+            for c in 0..QUAD {
                 matrix[other][c] -= share * row[c];
             }
         }
@@ -348,55 +361,56 @@ fn inverse(mut matrix: [[f64; TILE_SIDE]; TILE_SIDE]) -> [[f64; TILE_SIDE]; TILE
     matrix
 }
 
-/// Multiplies the components by the decoders: `point C_k + neighbour mean C_k`, on supports grown by a ring.
-fn fold(compact: &TinyCompact, tier: &mut TinyTier) {
+/// Multiplies the components by the decoders: `point C_k + neighbour mean C_k`, on supports grown by a ring. Gives the scales.
+fn fold(compact: &TinyCompact, tier: &mut TinyTier) -> Vec<ValueScales> {
     let dense = dense_components(compact);
-    let mut entries = Vec::new();
+    let (mut entries, mut all_scales) = (Vec::new(), Vec::new());
     for (k, component) in compact.components.iter().enumerate() {
         let decoder = &compact.blocks[component.block as usize].decoder;
-        for (lane, values) in convolve(decoder, &dense[k], tier).into_iter().enumerate() {
-            if values != [0.0; FEATURE_COUNT] {
-                let halves = values.map(|value| f16::from_f32(value).to_bits());
-                entries.push((k, component.block, lane as u32, halves));
+        let folded = convolve(decoder, &dense[k], tier);
+        let scales = ValueScales::for_values(&folded);
+        for (slot, values) in folded.iter().enumerate() {
+            if *values != [0.0; FEATURE_COUNT] {
+                entries.push((k, component.block, slot as u32, scales.round(values)));
             }
         }
+        all_scales.push(scales);
     }
-    let patches = Patches::gather(VERTEX_COUNT, entries);
-    tier.patch_offsets = patches.patch_offsets;
-    tier.patch_owners = patches.patch_owners;
-    tier.patch_values = patches.patch_values;
+    tier.patches = Patches::gather(VERTEX_COUNT, entries);
+    all_scales
 }
 
-/// Components without their value scales. Shape: `[K][V]`, source order.
+/// Components everywhere. Shape: `[K][V]`, source order.
 fn dense_components(compact: &TinyCompact) -> Vec<[[f32; FEATURE_COUNT]; VERTEX_COUNT]> {
     let mut values = compact.values.iter();
-    let dense = compact.support_bits.iter().map(|bits| {
+    let components = compact.support_bits.iter().zip(&compact.components);
+    let dense = components.map(|(bits, component)| {
         core::array::from_fn(|v| match bits >> v & 1 {
-            1 => values.next().map_or([0.0; FEATURE_COUNT], |halves| {
-                halves.map(|half| f16::from_bits(half).to_f32())
-            }),
+            1 => values
+                .next()
+                .map_or([0.0; FEATURE_COUNT], |whole| component.value_scales.widen(whole)),
             _ => [0.0; FEATURE_COUNT],
         })
     });
     dense.collect()
 }
 
-/// One component through a convolution without its bias; in source order, out in lanes.
+/// One component through a convolution without its bias; in source order, out in slots.
 fn convolve(
     conv: &GraphConvRecord,
     component: &[[f32; FEATURE_COUNT]; VERTEX_COUNT],
     tier: &TinyTier,
 ) -> Vec<[f32; FEATURE_COUNT]> {
-    let in_lanes = |lane: u32| component[VERTEX_FROM_LANE[lane as usize] as usize];
+    let in_slots = |slot: u32| component[VERTEX_FROM_SLOT[slot as usize] as usize];
     let product = |matrix: &[[f32; FEATURE_COUNT]; FEATURE_COUNT], input: [f32; FEATURE_COUNT]| {
         matrix.map(|row| row.iter().zip(input).map(|(a, x)| a * x).sum::<f32>())
     };
-    let convolved = (0..VERTEX_COUNT).map(|lane| {
-        let ring = &tier.ring[tier.ring_offsets[lane] as usize..tier.ring_offsets[lane + 1] as usize];
+    let convolved = (0..VERTEX_COUNT).map(|slot| {
+        let ring = &tier.ring[tier.ring_offsets[slot] as usize..tier.ring_offsets[slot + 1] as usize];
         let mean: [f32; FEATURE_COUNT] =
-            core::array::from_fn(|i| ring.iter().map(|&other| in_lanes(other)[i]).sum::<f32>() / ring.len() as f32);
+            core::array::from_fn(|i| ring.iter().map(|&other| in_slots(other)[i]).sum::<f32>() / ring.len() as f32);
         let (point, neighbour) = (
-            product(&conv.point, in_lanes(lane as u32)),
+            product(&conv.point, in_slots(slot as u32)),
             product(&conv.neighbour, mean),
         );
         core::array::from_fn(|i| point[i] + neighbour[i])

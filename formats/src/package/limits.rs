@@ -38,19 +38,32 @@ pub const RENDER_VERTICES: usize = 16 << 20;
 /// Texture coordinate, either sign.
 pub const TEXTURE: f32 = 1e6;
 
+/// Loose pieces that move as a whole.
+pub const PIECES: usize = 4096;
+/// Modes of the residual.
+pub const MODES: usize = 8;
+/// Factors of the prior.
+pub const PRIOR_FACTORS: usize = 16;
+/// Bytes of what the trainer keeps for its encoder.
+pub const ENCODER_BYTES: usize = 64 << 20;
+
 /// Coordinate of a rest position, either sign, units of the source.
 pub const POSITION: f32 = 1e9;
 /// Weight of a control, either sign.
 pub const CONTROL: f32 = 1e4;
-/// Scale of a component's half-precision values.
+/// Scale of whole numbers.
 pub const VALUE_SCALE: f32 = 1e6;
 /// Network value to radians, and to stretch.
 pub const FEATURE_SCALE: f32 = 1e3;
 /// Entry of a convolution's matrix or bias, either sign.
 pub const NETWORK_VALUE: f32 = 1e6;
-/// Nodes of a fast tier: a skin names them in 16 bits.
-pub const FAST_NODES: usize = 1 << 16;
-/// Cotangent weight of an edge; either sign in the fast tier.
+/// Bones: engines hold 256, of which they may want some.
+pub const BONES: usize = 250;
+/// Nodes that bones are made of.
+pub const BONE_NODES: usize = 1 << 12;
+/// What a node's gradient counts in a bone's, either sign.
+pub const BONE_VALUE: f32 = 1e3;
+/// Cotangent weight of an edge.
 pub const EDGE_WEIGHT: f32 = 1e9;
 /// Entry of the factor, either sign; for a Laplacian with non-negative weights the entries of a row are at most 1 together.
 pub const FACTOR_VALUE: f32 = 1e6;

@@ -1,11 +1,14 @@
 //! The package: a 64-byte header, then one rkyv archive of either a [`CompactBasis`] (what the trainer learned) or a
 //! [`BakedBasis`] (the same, ready for the frame path).
 
+mod after;
+mod archive;
 mod baked;
 mod baked_view;
-mod basis;
+mod bones;
+mod compact;
+mod compact_view;
 mod error;
-mod faces;
 #[cfg(feature = "alloc")]
 mod fans;
 #[cfg(feature = "std")]
@@ -13,38 +16,47 @@ mod file;
 #[cfg(any(all(test, feature = "alloc"), feature = "fixture"))]
 pub mod fixture;
 mod header;
+mod indices;
+#[cfg(test)]
+mod layout_tests;
 pub mod limits;
-mod open;
 #[cfg(feature = "alloc")]
 mod patches;
-mod render;
 mod rules;
+mod surface;
 #[cfg(all(test, feature = "alloc"))]
 mod tests;
+mod values;
 #[cfg(feature = "alloc")]
 mod write;
 
+pub use after::{After, ArchivedAfter, ArchivedPrior, NO_PIECE, Prior};
 pub use baked::{
-    ArchivedBakedBasis, ArchivedBakedBlock, ArchivedBakedComponent, ArchivedBakedFast, ArchivedBakedTier,
-    ArchivedFastError, BakedBasis, BakedBlock, BakedComponent, BakedFast, BakedTier, FastError, OnCacheLines,
-    SKIN_NODES, SKIN_WEIGHT_SUM, TILE_ENTRIES, TILE_SIDE,
+    ArchivedBakedBasis, ArchivedBakedBlock, ArchivedBakedComponent, ArchivedBakedExact, ArchivedBakedPatches,
+    ArchivedBakedSolve, BakedBasis, BakedBlock, BakedComponent, BakedExact, BakedPatches, BakedSolve, OnCacheLines,
+    QUAD, TILE_ENTRIES,
 };
-pub use baked_view::{BakedView, FastView, TierEntry, TierView};
-pub use basis::{
+pub use baked_view::{BakedView, ExactView, PatchEntry, PatchesView, SolveView};
+pub use bones::{
+    ArchivedBakedBones, ArchivedBakedSkin, ArchivedBonesError, ArchivedPoseError, BakedBones, BakedSkin, BoneGroup,
+    BonesError, BonesView, NORMAL_UNIT, PoseError, SKIN_WEIGHT_SUM, SkinView, TURN_NODES,
+};
+pub use compact::{
     ArchivedBlockRecord, ArchivedCompactBasis, ArchivedComponentRecord, ArchivedGraphConvRecord, ArchivedProvenance,
     ArchivedQuality, BlockRecord, CompactBasis, ComponentRecord, GraphConvRecord, Provenance, Quality,
 };
+pub use compact_view::{CompactEntry, CompactView};
 pub use error::OpenError;
-pub use faces::{AsShortAsFit, Faces};
 #[cfg(feature = "alloc")]
 pub use fans::Fans;
 #[cfg(feature = "std")]
 pub use file::{ReadError, SaveError, read_package, save_package};
 pub use header::{FIRST_VERSION, FORMAT_VERSION, HEADER_BYTES, Header, MAGIC, PAYLOAD_ALIGNMENT, PackageKind};
-pub use open::{CompactEntry, CompactView};
+pub use indices::{ArchivedIndices, Index, IndexSlice, Indices, SHORT_COUNT};
 #[cfg(feature = "alloc")]
 pub use patches::{Patch, Patches};
-pub use render::{ArchivedRenderMesh, RenderMesh};
+pub use surface::{ArchivedSurface, Faces, Surface, SurfaceView};
+pub use values::{ArchivedValueScales, ROTATION_FEATURES, ValueScales, nearest};
 #[cfg(feature = "alloc")]
 pub use write::{AlignedBytes, WriteError, write_baked, write_compact};
 

@@ -7,8 +7,8 @@ use sinew_peers::skinning::Skin;
 use sinew_peers::solvers::{FaerSimplicial, LowerTriangle};
 use sinew_peers::subject::Subject;
 use sinew_runtime::{
-    Basis, Controls, Drag, Frame, FrameError, Handles, HandlesLayout, Kernels, Normals, Reconstruct, TierChoice,
-    Workspace, WorkspaceLayout, steps,
+    Attribute, Basis, BoneMaps, BoneOutput, Controls, Drag, Frame, FrameError, Handles, HandlesLayout, Kernels,
+    Normals, Reconstruct, TierChoice, UnitEncoding, VertexLayout, VertexOutput, Workspace, WorkspaceLayout, steps,
 };
 
 use crate::measure::{Contender, Role};
@@ -30,18 +30,24 @@ impl Contenders {
         let without_bias = subject.without_bias();
         let faint = Basis::open(&without_bias).expect("a sound package");
         let mut contenders = Vec::new();
-        for kernels in [Kernels::Scalar, Kernels::Avx2, Kernels::Avx512] {
+        for kernels in [Kernels::Scalar, Kernels::Portable, Kernels::Avx2, Kernels::Avx512] {
             if kernels.run_here() {
                 let widest = kernels == Kernels::detect();
                 let all = basis.component_count();
                 contenders.push(frame(&basis, TierChoice::Exact, kernels, all, true));
+                if basis.bones().is_some() {
+                    contenders.push(bone_maps(&basis, kernels, all));
+                }
                 if widest {
                     contenders.push(frame(&basis, TierChoice::Exact, kernels, all, false));
                     contenders.push(frame(&basis, TierChoice::Exact, kernels, all.min(10), true));
-                    if basis.fast_node_count().is_some() {
-                        contenders.push(frame(&basis, TierChoice::Fast, kernels, all, true));
+                    if basis.bones().is_some() {
+                        contenders.push(frame(&basis, TierChoice::Bones, kernels, all, true));
                     }
                     contenders.extend([1, 4].map(|held| drag(&basis, kernels, held)));
+                    contenders.push(into_buffer(&basis, kernels, UnitEncoding::Octahedral16));
+                    contenders.push(into_buffer(&basis, kernels, UnitEncoding::Snorm16));
+                    contenders.push(one_moved(&basis, kernels));
                     contenders.push(unchanged(&basis, kernels));
                     let features = |v: usize, c: usize| 0.3 * (0.01 * v as f32 + c as f32).sin();
                     contenders.push(solve_path(&basis, kernels, features));
@@ -94,7 +100,7 @@ fn playing<'c>(
     let mut normals = positions.clone();
     let name = format!(
         "{} frame, {kernels:?}, {active} active{}",
-        if tier == TierChoice::Fast { "fast" } else { "exact" },
+        if tier == TierChoice::Bones { "bones" } else { "exact" },
         if with_normals { ", normals" } else { "" }
     );
     let run = move |round: usize| {
@@ -117,6 +123,33 @@ fn playing<'c>(
     }
 }
 
+/// Where the bones are, and no more: an engine skins.
+fn bone_maps<'c>(basis: &'c Basis<'c>, kernels: Kernels, active: usize) -> Contender<'c> {
+    let mut workspace = workspace(basis, TierChoice::Bones, kernels);
+    let component_count = basis.component_count();
+    let bone_count = basis.bones().map_or(0, |bones| bones.count());
+    let poses: Vec<_> = (0..POSES).map(|n| Subject::pose(component_count, active, n)).collect();
+    let mut weights = vec![0.0; component_count];
+    let mut maps = vec![[0.0; 12]; bone_count];
+    let run = move |round: usize| {
+        let mut controls = Controls::new(basis, &mut weights).expect("a weight a component");
+        for (k, &weight) in poses[round % POSES].iter().enumerate() {
+            controls.set(k, weight).expect("finite");
+        }
+        let job = BoneMaps {
+            basis,
+            controls: &controls,
+            maps: BoneOutput::Rows(&mut maps),
+        };
+        job.run(&mut workspace).expect("weights in range");
+    };
+    Contender {
+        name: format!("maps of {bone_count} bones, {kernels:?}, {active} active"),
+        role: Role::Measured,
+        run: Box::new(run),
+    }
+}
+
 /// The machine's own unrest: arithmetic in registers, the same every time.
 fn machine<'c>() -> Contender<'c> {
     const STEPS: u32 = 400_000;
@@ -130,6 +163,91 @@ fn machine<'c>() -> Contender<'c> {
             }
             black_box(x);
         }),
+    }
+}
+
+/// Frames that go on into a vertex buffer of positions and packed normals, interleaved.
+fn into_buffer<'c>(basis: &'c Basis<'c>, kernels: Kernels, encoding: UnitEncoding) -> Contender<'c> {
+    const STRIDE: usize = 20;
+    let mut workspace = workspace(basis, TierChoice::Exact, kernels);
+    let component_count = basis.component_count();
+    let mut weights = vec![0.0; component_count];
+    let mut points = [0, 1].map(|_| vec![[0.0; 3]; basis.vertex_count()]);
+    let mut bytes = vec![0; STRIDE * basis.render_vertex_count()];
+    let at = |offset_bytes| {
+        Some(Attribute {
+            offset_bytes,
+            stride_bytes: STRIDE,
+        })
+    };
+    let layout = VertexLayout {
+        positions: at(0),
+        normals: at(12),
+        encoding,
+        ..VertexLayout::default()
+    };
+    let run = move |round: usize| {
+        let mut controls = Controls::new(basis, &mut weights).expect("a weight a component");
+        for (k, &weight) in Subject::pose(component_count, component_count, round % POSES)
+            .iter()
+            .enumerate()
+        {
+            controls.set(k, weight).expect("finite");
+        }
+        let [positions, normals] = &mut points;
+        let frame = Frame {
+            basis,
+            controls: &controls,
+            positions,
+            normals: Some(normals),
+        };
+        frame.run(&mut workspace).expect("weights in range");
+        let output = VertexOutput {
+            basis,
+            positions,
+            normals: Some(normals),
+            scratch: &mut [],
+            layout,
+            bytes: &mut bytes,
+        };
+        output.run().expect("a layout that fits");
+        black_box(&bytes);
+    };
+    Contender {
+        name: format!("exact frame, {kernels:?}, into a buffer, {encoding:?}"),
+        role: Role::Measured,
+        run: Box::new(run),
+    }
+}
+
+/// Frames in each of which one control moves, each in turn.
+fn one_moved<'c>(basis: &'c Basis<'c>, kernels: Kernels) -> Contender<'c> {
+    let mut workspace = workspace(basis, TierChoice::Exact, kernels);
+    let component_count = basis.component_count();
+    let mut weights = vec![0.0; component_count];
+    let mut pose = Subject::pose(component_count, component_count, 0);
+    let mut points = [0, 1].map(|_| vec![[0.0; 3]; basis.vertex_count()]);
+    let mut count = 0;
+    let run = move |_| {
+        pose[count % component_count] = 0.3 + 0.05 * (count / component_count % 7) as f32;
+        count += 1;
+        let mut controls = Controls::new(basis, &mut weights).expect("a weight a component");
+        for (k, &weight) in pose.iter().enumerate() {
+            controls.set(k, weight).expect("finite");
+        }
+        let [positions, normals] = &mut points;
+        let frame = Frame {
+            basis,
+            controls: &controls,
+            positions,
+            normals: Some(normals),
+        };
+        frame.run(&mut workspace).expect("weights in range");
+    };
+    Contender {
+        name: format!("exact frame, {kernels:?}, one of {component_count} moved, normals"),
+        role: Role::Measured,
+        run: Box::new(run),
     }
 }
 
@@ -253,9 +371,9 @@ fn steps<'c>(basis: &'c Basis<'c>, kernels: Kernels) -> [Contender<'c>; 4] {
 
 fn normals<'c>(basis: &'c Basis<'c>) -> Contender<'c> {
     let positions: Vec<[f32; 3]> = basis
-        .lane_from_vertex()
+        .slot_from_vertex()
         .iter()
-        .map(|&lane| basis.rest_positions()[lane as usize])
+        .map(|slot| basis.rest_positions()[slot as usize])
         .collect();
     let mut normals = positions.clone();
     let mut workspace = workspace(basis, TierChoice::Exact, Kernels::detect());

@@ -1,5 +1,5 @@
-//! Whole frames beside their peers, in one run: `cargo bench -p sinew-runtime --bench frame`, with `--features cholmod` where
-//! libsuitesparse-dev is installed.
+//! Whole frames beside their peers, in one run: `cargo bench -p sinew-runtime --bench frame`, with
+//! `--features cholmod,sinew-peers/cholmod` where libsuitesparse-dev is installed.
 //!
 //! Every contender of a subject takes its turn in every round, so that a slow moment of the machine hits all alike; what is
 //! quoted is the median CPU time of one thread, and its ratio to the fastest dense loop over 60 morph targets. Arguments:
@@ -12,7 +12,8 @@ mod measure;
 
 use contenders::Contenders;
 use measure::{Contest, Settings};
-use sinew_formats::{interchange::read_sequence, package::read_package};
+use sinew_formats::package::read_package;
+use sinew_interchange::{Choice, read_sequence};
 use sinew_peers::subject::{COMPONENTS, Subject};
 use sinew_runtime::Kernels;
 
@@ -55,8 +56,9 @@ fn subjects() -> Vec<(String, Make)> {
             "horse 8431".into(),
             Box::new(move || {
                 let path = std::path::Path::new(&folder).join("horse");
-                let mut read = read_sequence(&path, &mut |_, _| {}).expect("SINEW_DATA holds the horse");
-                let rest = read.sequence.shapes.swap_remove(0);
+                let read =
+                    read_sequence(&path, &Choice::default(), &mut |_, _| {}).expect("SINEW_DATA holds the horse");
+                let rest = read.sequence.shapes[0].to_vec();
                 Subject::of_mesh("horse".into(), rest, read.sequence.faces)
             }),
         )),

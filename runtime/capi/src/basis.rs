@@ -1,17 +1,19 @@
 //! The basis handle: an opened package and what it says of its mesh and its controls. Read by all, written by none.
 
-use core::ffi::c_char;
+use core::ffi::{c_char, c_void};
 
 use sinew_formats::package::{NONE, limits::NAME_BYTES};
-use sinew_runtime::{Basis, Component, ControlError};
+use sinew_runtime::{Basis, Component, ControlError, Faces, PoseError, TierChoice};
 
 use crate::details::SinewDetails;
 use crate::edge::{edge, edge_with_details};
 use crate::fault::Fault;
-use crate::handle::{Body, Handle, Kind, Shared};
-use crate::memory::{Access, Out, Region, Regions, SinewLayout, array, handle_memory, present};
+use crate::handle::{Body, Handle, Shared};
+use crate::kind::Kind;
+use crate::memory::{Access, Out, Region, Regions, SinewLayout, handle_memory, present, slice, slice_mut, write_text};
+use crate::number;
 use crate::status::SinewStatus;
-use crate::structs::{GrowingStruct, StructOut};
+use crate::structs::{GrowingStruct, StructOut, choice};
 use crate::version::check_abi;
 
 /// Bytes of a buffer that holds any control's name, with the NUL.
@@ -21,8 +23,7 @@ pub const SINEW_NONE: u32 = u32::MAX;
 
 const _: () = assert!(SINEW_NAME_BYTES == NAME_BYTES + 1 && SINEW_NONE == NONE);
 
-/// An opened package, in memory of yours. Refers to the package's bytes: keep both in place, unchanged, until the last
-/// use of the basis.
+/// An opened package. Refers to the package's bytes.
 pub struct SinewBasis {
     _opaque: (),
 }
@@ -43,11 +44,11 @@ impl BasisBody {
     }
 }
 
-/// What a package holds. Set `struct_bytes` to `sizeof(SinewBasisInfo)` before the call.
+/// What a package holds.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct SinewBasisInfo {
-    /// `sizeof(SinewBasisInfo)`.
+    /// Set by `SINEW_INIT`.
     pub struct_bytes: usize,
     /// V: elements of positions and normals.
     pub vertex_count: u32,
@@ -61,25 +62,29 @@ pub struct SinewBasisInfo {
     pub content_id: [u8; 16],
     /// Identity of the compact package that this one was baked from.
     pub compact_id: [u8; 16],
-    /// Nodes of the fast tier; 0: the package has none.
-    pub fast_node_count: u32,
-    /// R: vertices of the render mesh, split where texture coordinates do; V where the package has none.
+    /// R: vertices that an engine draws, split where texture coordinates do; V where the package has none.
     pub render_vertex_count: u32,
     /// Whether the package has texture coordinates: 0 or 1.
     pub has_texture: u32,
-    /// Root mean square distance of the fast tier from the exact one in mixed poses, as a share of the diagonal of the
-    /// rest shape's bounding box; measured when the package was baked. 0 without fast tier.
-    pub fast_error_rms: f32,
-    /// Greatest such distance. 0 without fast tier.
-    pub fast_error_max: f32,
-    /// Root mean square angle between the normals of both tiers in those poses, radians. 0 without fast tier.
-    pub fast_error_normals: f32,
+    /// B: bones of the package; 0: it has none, and what follows is 0.
+    pub bone_count: u32,
+    /// Bones that a vertex follows at most: 4 or 8.
+    pub bone_influences: u32,
+    /// Root mean square distance of the bones from the exact tier, half of the controls anywhere within 70 % of their ranges,
+    /// as a share of the diagonal of the rest shape's bounding box; measured when the package was baked.
+    pub bone_error_rms: f32,
+    /// Greatest such distance.
+    pub bone_error_max: f32,
+    /// Root mean square angle between the normals of both tiers in those poses, radians.
+    pub bone_error_normals: f32,
+    /// Whether the package has the exact tier: 0 or 1. Without it workspaces play the bones, and nothing can be held.
+    pub has_exact_tier: u32,
 }
 
 // SAFETY: `repr(C)`, the size first, numbers only.
 unsafe impl GrowingStruct for SinewBasisInfo {
     const NAME: &'static str = "info";
-    const FIRST_BYTES: usize = core::mem::offset_of!(Self, fast_node_count);
+    const FIRST_BYTES: usize = size_of::<Self>();
 }
 
 /// Adds handle and package to the regions; nothing a call writes may lie in them.
@@ -96,10 +101,24 @@ pub(crate) unsafe fn share_basis<'h>(
     Ok(shared)
 }
 
-/// How much memory a basis handle needs; the same for every package.
+/// Checks a package in the caller's memory and opens it.
 ///
-/// Errors: `NULL_POINTER`, `MISALIGNED`.
-/// Threads: any.
+/// # Safety
+/// `bytes` is null or readable for `length`, and stays in place, unchanged, as long as the result is used.
+pub(crate) unsafe fn open_package(
+    bytes: *const c_void,
+    length: usize,
+    regions: &mut Regions,
+) -> Result<BasisBody, Fault> {
+    // SAFETY: the caller's promise.
+    let package = unsafe { slice(bytes.cast::<u8>(), length, length, "bytes", regions)? };
+    Ok(BasisBody {
+        package: Region::new(package.as_ptr(), length, "package", Access::Read)?,
+        basis: Basis::open(package)?,
+    })
+}
+
+/// How much memory a basis needs; the same for every package.
 ///
 /// # Safety
 /// `layout` is NULL or writable.
@@ -114,19 +133,14 @@ pub unsafe extern "C" fn sinew_basis_layout(layout: *mut SinewLayout) -> SinewSt
 }
 
 /// Opens a baked package: every check that costs more than a few comparisons is here, and no later call can fail because
-/// of the package. Copies nothing.
+/// of the package. Copies nothing. Some milliseconds for some ten thousand vertices.
 ///
 /// `abi_version`: pass `SINEW_ABI_VERSION`.
-/// `bytes`, `length`: the whole package, `length` exact, starting at a multiple of 16; `malloc` and file maps do.
-/// `memory`, `memory_bytes`: at least what `sinew_basis_layout` says.
-/// `basis`: takes the handle, which lies at `memory`.
-/// `details`: NULL, or takes the numbers behind a refusal.
+/// `bytes`, `length`: the whole package, at a multiple of 16; frames are fastest where it is one of 64.
 ///
-/// Opening again in the same memory is allowed when nothing uses the old handle; workspaces and controls of other content
-/// are then refused.
+/// Opening again in the same memory is allowed when nothing uses the old handle.
 ///
-/// Errors: `WRONG_ABI`, `NULL_POINTER`, `MISALIGNED`, `TOO_SHORT`, `TOO_LONG`, `OVERLAP`, `STRUCT_SIZE`, every `PACKAGE_...`.
-/// Threads: any; one call for one `memory`.
+/// Errors: `WRONG_ABI`, `PACKAGE_REFUSED`.
 ///
 /// # Safety
 /// Pointers are NULL or point to memory of the stated lengths. `bytes` and `memory` stay in place, and are written by nobody
@@ -134,9 +148,9 @@ pub unsafe extern "C" fn sinew_basis_layout(layout: *mut SinewLayout) -> SinewSt
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_basis_open(
     abi_version: u32,
-    bytes: *const u8,
+    bytes: *const c_void,
     length: usize,
-    memory: *mut u8,
+    memory: *mut c_void,
     memory_bytes: usize,
     basis: *mut *mut SinewBasis,
     details: *mut SinewDetails,
@@ -144,39 +158,20 @@ pub unsafe extern "C" fn sinew_basis_open(
     let open = |regions: &mut Regions| {
         check_abi(abi_version)?;
         let layout = Handle::<BasisBody>::layout(0);
-        array(bytes, length, length, "bytes", Access::Read, regions)?;
-        let package = Region::new(bytes, length, "package", Access::Read)?;
-        handle_memory(memory, memory_bytes, layout, regions)?;
+        let memory = handle_memory(memory, memory_bytes, layout, regions)?;
         let out = Out::required(basis, "basis", regions)?;
-        // SAFETY: the caller's promise; neither null nor beyond the address space.
-        let opened = Basis::open(unsafe { core::slice::from_raw_parts(bytes, length) })?;
-        let body = |_: &mut [u8]| Ok(BasisBody { basis: opened, package });
-        // SAFETY: the memory was checked against this layout.
-        unsafe { out.write(Handle::create(memory, layout, body)?.cast()) };
+        // SAFETY: the caller's promise; the memory was checked against this layout.
+        unsafe {
+            let body = open_package(bytes, length, regions)?;
+            out.write(Handle::create(memory, layout, |_| Ok(body))?.cast());
+        }
         Ok(())
     };
     // SAFETY: the caller's promise.
     unsafe { edge_with_details(details, open) }
 }
 
-/// Ends a basis: later calls with it are refused with `CLOSED_HANDLE` while its memory stands. There is nothing to free, so
-/// this is optional before memory and package are given back.
-///
-/// Errors: those of a handle.
-/// Threads: any, when no other uses the basis; one that does at this moment is noticed.
-///
-/// # Safety
-/// `basis` is NULL or points to a handle's memory.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn sinew_basis_close(basis: *mut SinewBasis) -> SinewStatus {
-    // SAFETY: the caller's promise.
-    edge(|| unsafe { Handle::<BasisBody>::close(basis.cast()) })
-}
-
 /// Counts and identities.
-///
-/// Errors: those of a handle; `STRUCT_SIZE`, `OVERLAP`.
-/// Threads: any number at a time.
 ///
 /// # Safety
 /// `basis` is NULL or a basis; `info` is NULL or as long as its first member says.
@@ -187,6 +182,9 @@ pub unsafe extern "C" fn sinew_basis_info(basis: *const SinewBasis, info: *mut S
         // SAFETY: the caller's promise, both.
         let (out, shared) = unsafe { (StructOut::required(info, regions)?, share_basis(basis, regions)?) };
         let basis = &shared.basis;
+        let error = basis
+            .bones()
+            .map_or(PoseError::default(), |bones| bones.error().sliders);
         let deepest = basis.components().map(|component| component.level).max();
         out.write(&SinewBasisInfo {
             struct_bytes: size_of::<SinewBasisInfo>(),
@@ -196,61 +194,67 @@ pub unsafe extern "C" fn sinew_basis_info(basis: *const SinewBasis, info: *mut S
             level_count: deepest.map_or(0, |level| level + 1),
             content_id: basis.id(),
             compact_id: basis.compact_id(),
-            fast_node_count: basis.fast_node_count().unwrap_or(0) as u32,
             render_vertex_count: basis.render_vertex_count() as u32,
-            has_texture: (!basis.render_mesh().vertices.is_empty()).into(),
-            fast_error_rms: basis.fast_error().map_or(0.0, |error| error.mixed_rms),
-            fast_error_max: basis.fast_error().map_or(0.0, |error| error.mixed_max),
-            fast_error_normals: basis.fast_error().map_or(0.0, |error| error.normal_rms),
+            has_texture: basis.surface().has_texture().into(),
+            bone_count: basis.bones().map_or(0, |bones| bones.count()) as u32,
+            bone_influences: basis.bones().map_or(0, |bones| bones.influences()) as u32,
+            bone_error_rms: error.rms,
+            bone_error_max: error.max,
+            bone_error_normals: error.normal_rms,
+            has_exact_tier: basis.has_tier(TierChoice::Exact).into(),
         });
         Ok(())
     })
 }
 
-/// The triangles: three vertex indices each, counter-clockwise from outside, source order.
+/// The way round in which a triangle's corners are written.
+#[repr(i32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SinewWinding {
+    /// As in the source: counter-clockwise, seen from outside.
+    CounterClockwise = 0,
+    /// The other way: for engines whose front faces are clockwise, or for axes that mirror; not for both.
+    Clockwise = 1,
+}
+
+/// The triangles by vertices: three indices each, in the order of the source.
 ///
-/// `indices` takes a pointer into the package, good as long as the package stands; `index_count` takes 3 F.
+/// `indices`, `index_count`: take 3 F.
 ///
-/// Errors: those of a handle; `OVERLAP`.
-/// Threads: any number at a time.
+/// Errors: `UNKNOWN_OPTION`.
 ///
 /// # Safety
-/// `basis` is NULL or a basis; the others are NULL or writable.
+/// `basis` is NULL or a basis; `indices` is NULL or writable for `index_count`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_basis_faces(
     basis: *const SinewBasis,
-    indices: *mut *const u32,
-    index_count: *mut usize,
+    winding: number::SinewWinding,
+    indices: *mut u32,
+    index_count: usize,
 ) -> SinewStatus {
     // SAFETY: the caller's promise.
-    unsafe { triangles(basis, indices, index_count, |basis| basis.faces()) }
+    unsafe { triangles(basis, winding, indices, index_count, |basis| basis.faces()) }
 }
 
-/// The triangles of the render mesh, whose vertices `sinew_vertices_write` writes: those of `sinew_basis_faces` where the
-/// package has no texture coordinates.
+/// The triangles by render vertices, which `sinew_vertices_write` writes: what an engine draws.
 ///
-/// `indices` takes a pointer into the package, good as long as the package stands; `index_count` takes 3 F.
+/// `indices`, `index_count`: take 3 F.
 ///
-/// Errors: those of a handle; `OVERLAP`.
-/// Threads: any number at a time.
+/// Errors: `UNKNOWN_OPTION`.
 ///
 /// # Safety
-/// `basis` is NULL or a basis; the others are NULL or writable.
+/// `basis` is NULL or a basis; `indices` is NULL or writable for `index_count`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_basis_render_faces(
     basis: *const SinewBasis,
-    indices: *mut *const u32,
-    index_count: *mut usize,
+    winding: number::SinewWinding,
+    indices: *mut u32,
+    index_count: usize,
 ) -> SinewStatus {
     // SAFETY: the caller's promise.
     unsafe {
-        triangles(basis, indices, index_count, |basis| {
-            let render = basis.render_mesh();
-            if render.vertices.is_empty() {
-                basis.faces()
-            } else {
-                render.faces
-            }
+        triangles(basis, winding, indices, index_count, |basis| {
+            basis.surface().drawn_faces()
         })
     }
 }
@@ -259,21 +263,21 @@ pub unsafe extern "C" fn sinew_basis_render_faces(
 /// As for the functions above.
 unsafe fn triangles(
     basis: *const SinewBasis,
-    indices: *mut *const u32,
-    index_count: *mut usize,
-    faces: impl FnOnce(&Basis<'static>) -> &'static [[u32; 3]],
+    winding: number::SinewWinding,
+    indices: *mut u32,
+    index_count: usize,
+    faces: impl FnOnce(&Basis<'static>) -> Faces<'static>,
 ) -> SinewStatus {
     edge(|| {
         let regions = &mut Regions::new();
-        let pointer = Out::required(indices, "indices", regions)?;
-        let count = Out::required(index_count, "index_count", regions)?;
         // SAFETY: the caller's promise.
         let shared = unsafe { share_basis(basis, regions)? };
-        let faces = faces(&shared.basis).as_flattened();
-        // SAFETY: the caller's promise, both.
-        unsafe {
-            pointer.write(faces.as_ptr());
-            count.write(faces.len());
+        let corners = choice("winding", winding, &[[0, 1, 2], [0, 2, 1]])?;
+        let faces = faces(&shared.basis);
+        // SAFETY: the caller's promise.
+        let out = unsafe { slice_mut(indices, index_count, 3 * faces.len(), "indices", regions)? };
+        for (out, face) in out.as_chunks_mut::<3>().0.iter_mut().zip(faces.iter()) {
+            *out = corners.map(|corner: usize| face[corner]);
         }
         Ok(())
     })
@@ -293,8 +297,7 @@ fn component(basis: &Basis<'static>, control: u32) -> Result<Component<'static>,
 
 /// The name of a control, UTF-8, ended by NUL. `SINEW_NAME_BYTES` are always enough.
 ///
-/// Errors: those of a handle; `NO_SUCH_CONTROL`, `TOO_SHORT` (nothing was written), `OVERLAP`.
-/// Threads: any number at a time.
+/// Errors: `NO_SUCH_CONTROL`.
 ///
 /// # Safety
 /// `basis` is NULL or a basis; `name` is NULL or writable for `name_bytes`.
@@ -308,23 +311,18 @@ pub unsafe extern "C" fn sinew_control_name(
     edge(|| {
         let regions = &mut Regions::new();
         present(name, "name")?;
-        // SAFETY: the caller's promise.
-        let shared = unsafe { share_basis(basis, regions)? };
-        let text = component(&shared.basis, control)?.name.as_bytes();
-        array(name, name_bytes, text.len() + 1, "name", Access::Write, regions)?;
-        // SAFETY: the buffer is that long, and apart from the package.
+        // SAFETY: the caller's promise, both.
         unsafe {
-            text.as_ptr().copy_to_nonoverlapping(name.cast(), text.len());
-            name.add(text.len()).write(0);
+            let shared = share_basis(basis, regions)?;
+            let text = component(&shared.basis, control)?.name;
+            write_text(text, name, name_bytes, "name", regions)
         }
-        Ok(())
     })
 }
 
-/// The control of this name, which ends with NUL. Takes time in proportion to the number of controls.
+/// The control of this name, which ends with NUL. Looks at one name after the other.
 ///
-/// Errors: those of a handle; `NO_SUCH_NAME`, `OVERLAP`.
-/// Threads: any number at a time.
+/// Errors: `NO_SUCH_NAME`.
 ///
 /// # Safety
 /// `basis` is NULL or a basis; `name` is NULL or readable up to its NUL; `control` is NULL or writable.
@@ -370,8 +368,7 @@ unsafe fn bounded(name: *const c_char, text: &mut [u8; NAME_BYTES]) -> Option<&s
 ///
 /// `minimum`, `maximum`: NULL where not wanted.
 ///
-/// Errors: those of a handle; `NO_SUCH_CONTROL`, `OVERLAP`.
-/// Threads: any number at a time.
+/// Errors: `NO_SUCH_CONTROL`.
 ///
 /// # Safety
 /// `basis` is NULL or a basis; the others are NULL or writable.
@@ -403,8 +400,7 @@ pub unsafe extern "C" fn sinew_control_range(
 /// `parent` takes the control above it, or `SINEW_NONE` for a coarse one; `level` takes 0 for coarse ones, 1 for their
 /// children and so on. Either may be NULL where not wanted.
 ///
-/// Errors: those of a handle; `NO_SUCH_CONTROL`, `OVERLAP`.
-/// Threads: any number at a time.
+/// Errors: `NO_SUCH_CONTROL`.
 ///
 /// # Safety
 /// `basis` is NULL or a basis; the others are NULL or writable.

@@ -1,25 +1,27 @@
 //! The batch handle: many instances of one basis, played by as many threads as the caller lends. No thread is made here, and
 //! none waits.
 
+use core::ffi::c_void;
 use core::sync::atomic::{AtomicI32, Ordering};
 
 use sinew_runtime::Batch;
 
 use crate::basis::{SinewBasis, share_basis};
-use crate::carve;
+use crate::carve::Carver;
 use crate::controls::SinewControls;
 use crate::details::SinewDetails;
 use crate::edge::{edge, edge_with_details};
 use crate::fault::Fault;
 use crate::frame::Target;
-use crate::handle::{Body, Handle, Kind};
+use crate::handle::{Body, Handle};
+use crate::kind::Kind;
 use crate::memory::{Out, Regions, SinewLayout, handle_memory};
+use crate::number;
 use crate::status::{SinewStatus, known};
 use crate::structs::{Elements, GrowingElement, GrowingStruct, StructOut};
 use crate::workspace::SinewWorkspace;
 
-/// A round of frames over many instances, in memory of yours. The instances' handles and buffers stay in place until the
-/// last use of the batch.
+/// A round of frames over many instances, whose handles and buffers stay in place until the last use of the batch.
 pub struct SinewBatch {
     _opaque: (),
 }
@@ -61,16 +63,16 @@ impl SinewInstance {
     }
 }
 
-/// How an instance's last frame went. Set `struct_bytes` to `sizeof(SinewInstanceReport)` before the call.
+/// How an instance's last frame went.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct SinewInstanceReport {
-    /// `sizeof(SinewInstanceReport)`.
+    /// Set by `SINEW_INIT`.
     pub struct_bytes: usize,
     /// What `sinew_frame` would have returned; `SINEW_STATUS_OK` before the first frame.
     pub status: SinewStatus,
-    /// A `SinewFrameOutcome`; 0 before the first frame and where the frame was refused.
-    pub outcome: i32,
+    /// 0 before the first frame and where the frame was refused.
+    pub outcome: number::SinewFrameOutcome,
 }
 
 // SAFETY: `repr(C)`, the size first. It is only written, never read.
@@ -103,16 +105,32 @@ impl Body for BatchBody {
     const KIND: Kind = Kind::Batch;
 }
 
+/// The arrays of a batch.
+struct Arrays {
+    jobs: &'static mut [Job],
+    outcomes: &'static mut [[i32; 2]],
+}
+
+impl Arrays {
+    fn cut(carver: &mut Carver, instance_count: usize) -> Self {
+        let nowhere = Job {
+            target: Target::NOWHERE,
+            index: 0,
+        };
+        Self {
+            jobs: carver.take(instance_count, nowhere),
+            outcomes: carver.take(instance_count, [0; 2]),
+        }
+    }
+}
+
 fn batch_layout(instance_count: usize) -> SinewLayout {
-    // Counts beyond all memory saturate, and then no memory is large enough.
-    let count = instance_count.min(isize::MAX as usize / 1024);
-    Handle::<BatchBody>::layout(carve::bytes::<Job>(count) + carve::bytes::<[i32; 2]>(count))
+    let mut carver = Carver::measuring();
+    Arrays::cut(&mut carver, instance_count);
+    Handle::<BatchBody>::layout(carver.bytes())
 }
 
 /// How much memory a batch needs.
-///
-/// Errors: `NULL_POINTER`, `MISALIGNED`.
-/// Threads: any.
 ///
 /// # Safety
 /// `layout` is NULL or writable.
@@ -131,13 +149,8 @@ pub unsafe extern "C" fn sinew_batch_layout(instance_count: usize, layout: *mut 
 ///
 /// `instances`, `instance_count`, `instance_bytes`: copied; the last is `sizeof(SinewInstance)`. Handles are of `basis`;
 /// those that are of other content are refused when they are played.
-/// `memory`, `memory_bytes`: at least what `sinew_batch_layout` says; what lies beyond that stays untouched.
-/// `batch`: takes the handle, which lies at `memory`.
-/// `details`: NULL, or takes the numbers behind a refusal.
 ///
-/// Errors: those of a handle; `TOO_SHORT`, `TOO_LONG`, `OVERLAP` (of instances with each other too), `STRUCT_SIZE`,
-/// `UNKNOWN_OPTION`.
-/// Threads: any number at a time, each with memory of its own.
+/// Errors: `OVERLAP` (of instances with each other too), `UNKNOWN_OPTION`.
 ///
 /// # Safety
 /// `basis` is NULL or a basis; the others are NULL or point to memory of the stated lengths. `memory`, and what the instances
@@ -148,7 +161,7 @@ pub unsafe extern "C" fn sinew_batch_create(
     instances: *const SinewInstance,
     instance_count: usize,
     instance_bytes: usize,
-    memory: *mut u8,
+    memory: *mut c_void,
     memory_bytes: usize,
     batch: *mut *mut SinewBatch,
     details: *mut SinewDetails,
@@ -163,7 +176,7 @@ pub unsafe extern "C" fn sinew_batch_create(
             )
         };
         let layout = batch_layout(instance_count);
-        handle_memory(memory, memory_bytes, layout, regions)?;
+        let memory = handle_memory(memory, memory_bytes, layout, regions)?;
         let vertex_count = shared.basis.vertex_count();
         for index in 0..instance_count {
             let target = instance(&instances, index)?;
@@ -178,18 +191,13 @@ pub unsafe extern "C" fn sinew_batch_create(
             }
         }
         let body = |buffers: &'static mut [u8]| {
-            let nowhere = Job {
-                target: Target::NOWHERE,
-                index: 0,
-            };
-            let (jobs, buffers) = carve::filled(buffers, nowhere, instance_count);
+            let Arrays { jobs, outcomes } = Arrays::cut(&mut Carver::carving(buffers), instance_count);
             for (index, job) in jobs.iter_mut().enumerate() {
                 *job = Job {
                     target: instance(&instances, index)?,
                     index,
                 };
             }
-            let (outcomes, _) = carve::filled(buffers, [0_i32; 2], instance_count);
             let first = jobs.as_mut_ptr();
             Ok(BatchBody {
                 // SAFETY: the array that was just written, used through this alone.
@@ -215,32 +223,14 @@ fn instance(instances: &Elements<SinewInstance>, index: usize) -> Result<Target,
     Ok(instances.get(index).ok_or(missing)??.target())
 }
 
-/// Ends a batch: later calls with it are refused with `CLOSED_HANDLE` while its memory stands. There is nothing to free, so
-/// this is optional before the memory is given back.
-///
-/// Errors: those of a handle.
-/// Threads: alone; another one's use at this moment is noticed.
-///
-/// # Safety
-/// `batch` is NULL or points to a handle's memory.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn sinew_batch_close(batch: *mut SinewBatch) -> SinewStatus {
-    // SAFETY: the caller's promise.
-    edge(|| unsafe { Handle::<BatchBody>::close(batch.cast()) })
-}
-
 /// Plays a frame of instances until none is left of this round. Any number of threads call it for one round; each instance
 /// is played once, by the thread that comes first, and the results have the same bits whatever the number of threads. The
-/// round is over when every call has returned; what became of each instance, `sinew_batch_report` says.
+/// round is over when every call has returned; what became of each instance, `sinew_batch_report` says. Waits for nothing.
 ///
 /// `basis`: of the instances' content.
 /// `played`: NULL, or takes how many instances this call had.
-/// `details`: NULL, or takes the numbers behind a refusal of the call itself.
 ///
-/// Allocates nothing and waits for nothing.
-///
-/// Errors: those of a handle; `OVERLAP`, `STRUCT_SIZE`. A refusal of one instance stays with it.
-/// Threads: any number at a time for one batch.
+/// Errors: none but the usual. A refusal of one instance stays with it.
 ///
 /// # Safety
 /// `basis` is NULL or a basis; `batch` is NULL or a batch; the others are NULL or writable.
@@ -280,10 +270,7 @@ pub unsafe extern "C" fn sinew_batch_play(
     unsafe { edge_with_details(details, play) }
 }
 
-/// Begins the next round: every instance will be played again.
-///
-/// Errors: those of a handle; `IN_USE` while another thread is playing.
-/// Threads: alone; another one's use at this moment is noticed.
+/// Begins the next round: every instance will be played again. `IN_USE` while another thread is playing.
 ///
 /// # Safety
 /// `batch` is NULL or a batch.
@@ -299,10 +286,9 @@ pub unsafe extern "C" fn sinew_batch_begin(batch: *mut SinewBatch) -> SinewStatu
     })
 }
 
-/// How an instance's last frame went.
+/// How an instance's last frame went; certain once the round is over.
 ///
-/// Errors: those of a handle; `NO_SUCH_INSTANCE`, `STRUCT_SIZE`, `OVERLAP`.
-/// Threads: any number at a time for one batch; certain once the round is over.
+/// Errors: `NO_SUCH_INSTANCE`.
 ///
 /// # Safety
 /// `batch` is NULL or a batch; `report` is NULL or as long as its first member says.

@@ -1,27 +1,45 @@
 //! The controls handle: the K weights that a performer moves. Holds copies of the ranges, so that setting a weight needs
 //! neither basis nor package.
 
-use sinew_runtime::{Basis, ControlError, FrameError};
+use core::ffi::c_void;
+
+use sinew_runtime::{Basis, ControlError, Controls, FrameError};
 
 use crate::basis::{SinewBasis, share_basis};
+use crate::carve::Carver;
 use crate::details::SinewDetails;
 use crate::edge::{edge, edge_with_details};
 use crate::fault::Fault;
-use crate::handle::{Body, Handle, Kind, Lent};
-use crate::memory::{Access, Out, Regions, SinewLayout, array, handle_memory};
+use crate::handle::{Body, Handle, Lent};
+use crate::kind::Kind;
+use crate::memory::{Out, Regions, SinewLayout, handle_memory, slice, slice_mut};
 use crate::status::SinewStatus;
 
-/// One weight a component, 0 at rest, in memory of yours.
+/// One weight a component, 0 at rest.
 pub struct SinewControls {
     _opaque: (),
 }
 
 pub(crate) struct ControlsBody {
     basis_id: [u8; 16],
+    arrays: Arrays,
+}
+
+/// The arrays of a handle with `K` controls.
+struct Arrays {
     /// Shape: `[K]`, finite.
-    pub(crate) weights: &'static mut [f32],
+    weights: &'static mut [f32],
     /// Lower and upper stops. Shape: `[K]`.
-    ranges: &'static [[f32; 2]],
+    ranges: &'static mut [[f32; 2]],
+}
+
+impl Arrays {
+    fn cut(carver: &mut Carver, control_count: usize) -> Self {
+        Self {
+            weights: carver.take(control_count, 0.0),
+            ranges: carver.take(control_count, [0.0; 2]),
+        }
+    }
 }
 
 impl Body for ControlsBody {
@@ -29,16 +47,33 @@ impl Body for ControlsBody {
 }
 
 impl ControlsBody {
-    const BYTES_A_CONTROL: usize = size_of::<f32>() + size_of::<[f32; 2]>();
-
-    fn layout(control_count: usize) -> SinewLayout {
-        Handle::<Self>::layout(control_count * Self::BYTES_A_CONTROL)
+    pub(crate) fn layout(basis: &Basis<'_>) -> SinewLayout {
+        let mut carver = Carver::measuring();
+        Arrays::cut(&mut carver, basis.component_count());
+        Handle::<Self>::layout(carver.bytes())
     }
 
-    /// Refuses a basis of other content.
-    pub(crate) fn check_basis(&self, basis: &Basis<'_>) -> Result<(), Fault> {
+    /// # Safety
+    /// `memory` was checked against the layout for this basis.
+    pub(crate) unsafe fn create(basis: &Basis<'_>, memory: *mut u8) -> Result<*mut SinewControls, Fault> {
+        let body = |buffers: &'static mut [u8]| {
+            let arrays = Arrays::cut(&mut Carver::carving(buffers), basis.component_count());
+            for (range, component) in arrays.ranges.iter_mut().zip(basis.components()) {
+                *range = [component.minimum, component.maximum];
+            }
+            Ok(Self {
+                basis_id: basis.id(),
+                arrays,
+            })
+        };
+        // SAFETY: the caller's promise.
+        Ok(unsafe { Handle::create(memory, Self::layout(basis), body)? }.cast())
+    }
+
+    /// The weights, for a basis of the content that these were made for.
+    pub(crate) fn weights(&mut self, basis: &Basis<'_>) -> Result<&mut [f32], Fault> {
         if self.basis_id == basis.id() {
-            Ok(())
+            Ok(&mut *self.arrays.weights)
         } else {
             Err(Fault::Frame(FrameError::ForeignControls))
         }
@@ -46,12 +81,12 @@ impl ControlsBody {
 
     /// Where a control stops.
     fn clamped(&self, control: usize, weight: f32) -> f32 {
-        let [minimum, maximum] = self.ranges[control];
+        let [minimum, maximum] = self.arrays.ranges[control];
         weight.clamp(minimum, maximum)
     }
 
     fn check_index(&self, control: u32) -> Result<usize, Fault> {
-        let (component, component_count) = (control as usize, self.weights.len());
+        let (component, component_count) = (control as usize, self.arrays.weights.len());
         if component < component_count {
             Ok(component)
         } else {
@@ -84,9 +119,6 @@ pub(crate) unsafe fn lend_controls<'h>(
 
 /// How much memory controls for this basis need: 12 bytes a control, and some for the handle.
 ///
-/// Errors: those of a handle; `OVERLAP`.
-/// Threads: any number at a time.
-///
 /// # Safety
 /// `basis` is NULL or a basis; `layout` is NULL or writable.
 #[unsafe(no_mangle)]
@@ -95,22 +127,12 @@ pub unsafe extern "C" fn sinew_controls_layout(basis: *const SinewBasis, layout:
         let regions = &mut Regions::new();
         let out = Out::required(layout, "layout", regions)?;
         // SAFETY: the caller's promise, both.
-        unsafe {
-            let shared = share_basis(basis, regions)?;
-            out.write(ControlsBody::layout(shared.basis.component_count()));
-        }
+        unsafe { out.write(ControlsBody::layout(&share_basis(basis, regions)?.basis)) };
         Ok(())
     })
 }
 
 /// Makes controls, all at rest.
-///
-/// `memory`, `memory_bytes`: at least what `sinew_controls_layout` says; what lies beyond that stays untouched.
-/// `controls`: takes the handle, which lies at `memory`.
-/// `details`: NULL, or takes the numbers behind a refusal.
-///
-/// Errors: those of a handle; `TOO_SHORT`, `TOO_LONG`, `OVERLAP`, `STRUCT_SIZE`.
-/// Threads: any number at a time, each with `memory` of its own.
 ///
 /// # Safety
 /// `basis` is NULL or a basis; the others are NULL or point to memory of the stated lengths. `memory` stays in place, and is
@@ -118,67 +140,31 @@ pub unsafe extern "C" fn sinew_controls_layout(basis: *const SinewBasis, layout:
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_controls_create(
     basis: *const SinewBasis,
-    memory: *mut u8,
+    memory: *mut c_void,
     memory_bytes: usize,
     controls: *mut *mut SinewControls,
     details: *mut SinewDetails,
 ) -> SinewStatus {
     let create = |regions: &mut Regions| {
         let out = Out::required(controls, "controls", regions)?;
-        // SAFETY: the caller's promise.
-        let shared = unsafe { share_basis(basis, regions)? };
-        let basis = &shared.basis;
-        let count = basis.component_count();
-        let layout = ControlsBody::layout(count);
-        handle_memory(memory, memory_bytes, layout, regions)?;
-        let body = |buffers: &'static mut [u8]| {
-            let start = buffers.as_mut_ptr();
-            // SAFETY: the layout holds three arrays of `count` floats, aligned to 64 bytes, and zero bits are floats.
-            let (weights, ranges) = unsafe {
-                start.write_bytes(0, count * ControlsBody::BYTES_A_CONTROL);
-                (
-                    core::slice::from_raw_parts_mut(start.cast::<f32>(), count),
-                    core::slice::from_raw_parts_mut(start.cast::<f32>().add(count).cast::<[f32; 2]>(), count),
-                )
-            };
-            for (range, component) in ranges.iter_mut().zip(basis.components()) {
-                *range = [component.minimum, component.maximum];
-            }
-            Ok(ControlsBody {
-                basis_id: basis.id(),
-                weights,
-                ranges,
-            })
-        };
-        // SAFETY: the memory was checked against this layout.
-        unsafe { out.write(Handle::create(memory, layout, body)?.cast()) };
+        // SAFETY: the caller's promise, all; the memory was checked against this layout.
+        unsafe {
+            let shared = share_basis(basis, regions)?;
+            let layout = ControlsBody::layout(&shared.basis);
+            let memory = handle_memory(memory, memory_bytes, layout, regions)?;
+            out.write(ControlsBody::create(&shared.basis, memory)?);
+        }
         Ok(())
     };
     // SAFETY: the caller's promise.
     unsafe { edge_with_details(details, create) }
 }
 
-/// Ends controls: later calls with them are refused with `CLOSED_HANDLE` while their memory stands. There is nothing to
-/// free, so this is optional before the memory is given back.
-///
-/// Errors: those of a handle.
-/// Threads: one at a time for each controls handle; another one's use at this moment is noticed.
-///
-/// # Safety
-/// `controls` is NULL or points to a handle's memory.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn sinew_controls_close(controls: *mut SinewControls) -> SinewStatus {
-    // SAFETY: the caller's promise.
-    edge(|| unsafe { Handle::<ControlsBody>::close(controls.cast()) })
-}
-
-/// Sets a control, clamped to its range. NaN and infinities are refused: an infinite knob is a fault, not a wish for the
-/// stop.
+/// Sets a control, clamped to its range. An infinite knob is a fault, not a wish for the stop.
 ///
 /// `taken`: NULL, or takes the weight after clamping.
 ///
-/// Errors: those of a handle; `NO_SUCH_CONTROL`, `NOT_FINITE`, `OVERLAP`.
-/// Threads: one at a time for each controls handle; another one's use at this moment is noticed.
+/// Errors: `NO_SUCH_CONTROL`, `NOT_FINITE`.
 ///
 /// # Safety
 /// `controls` is NULL or controls; `taken` is NULL or writable.
@@ -196,7 +182,7 @@ pub unsafe extern "C" fn sinew_control_set(
         let mut lent = unsafe { lend_controls(controls, regions)? };
         let k = lent.check(control, weight)?;
         let weight = lent.clamped(k, weight);
-        lent.weights[k] = weight;
+        lent.arrays.weights[k] = weight;
         // SAFETY: the caller's promise.
         unsafe { out.write(weight) };
         Ok(())
@@ -205,8 +191,7 @@ pub unsafe extern "C" fn sinew_control_set(
 
 /// Sets a control beyond its stops, where a pose may leave what was seen in training.
 ///
-/// Errors: those of a handle; `NO_SUCH_CONTROL`, `NOT_FINITE`.
-/// Threads: one at a time for each controls handle; another one's use at this moment is noticed.
+/// Errors: `NO_SUCH_CONTROL`, `NOT_FINITE`.
 ///
 /// # Safety
 /// `controls` is NULL or controls.
@@ -220,15 +205,14 @@ pub unsafe extern "C" fn sinew_control_set_unclamped(
         // SAFETY: the caller's promise.
         let mut lent = unsafe { lend_controls(controls, &mut Regions::new())? };
         let k = lent.check(control, weight)?;
-        lent.weights[k] = weight;
+        lent.arrays.weights[k] = weight;
         Ok(())
     })
 }
 
 /// The weight of a control.
 ///
-/// Errors: those of a handle; `NO_SUCH_CONTROL`, `OVERLAP`.
-/// Threads: one at a time for each controls handle; another one's use at this moment is noticed.
+/// Errors: `NO_SUCH_CONTROL`.
 ///
 /// # Safety
 /// `controls` is NULL or controls; `weight` is NULL or writable.
@@ -245,7 +229,7 @@ pub unsafe extern "C" fn sinew_control_get(
         let lent = unsafe { lend_controls(controls, regions)? };
         let k = lent.check_index(control)?;
         // SAFETY: the caller's promise.
-        unsafe { out.write(lent.weights[k]) };
+        unsafe { out.write(lent.arrays.weights[k]) };
         Ok(())
     })
 }
@@ -253,11 +237,8 @@ pub unsafe extern "C" fn sinew_control_get(
 /// Sets all controls at once, each clamped to its range; for animation that comes as arrays.
 ///
 /// `weights`, `weight_count`: exactly K.
-/// `details`: NULL, or takes the numbers behind a refusal.
 ///
-/// Errors: those of a handle; `TOO_SHORT`, `NO_SUCH_CONTROL` (more than K), `NOT_FINITE` (none is set),
-/// `OVERLAP`, `STRUCT_SIZE`.
-/// Threads: one at a time for each controls handle; another one's use at this moment is noticed.
+/// Errors: `NO_SUCH_CONTROL` (more than K), `NOT_FINITE` (none is set).
 ///
 /// # Safety
 /// `controls` is NULL or controls; `weights` is NULL or readable for `weight_count` floats.
@@ -269,23 +250,24 @@ pub unsafe extern "C" fn sinew_controls_set_all(
     details: *mut SinewDetails,
 ) -> SinewStatus {
     let set = |regions: &mut Regions| {
-        // SAFETY: the caller's promise.
-        let mut lent = unsafe { lend_controls(controls, regions)? };
-        let count = lent.weights.len();
-        array(weights, weight_count, count, "weights", Access::Read, regions)?;
+        // SAFETY: the caller's promise, both.
+        let (mut lent, given) = unsafe {
+            let lent = lend_controls(controls, regions)?;
+            let count = lent.arrays.weights.len();
+            (lent, slice(weights, weight_count, count, "weights", regions)?)
+        };
+        let count = given.len();
         if weight_count > count {
             return Err(Fault::Control(ControlError::NoSuchComponent {
                 component: count,
                 component_count: count,
             }));
         }
-        // SAFETY: the caller's promise; checked, and apart from the controls' memory.
-        let given = unsafe { core::slice::from_raw_parts(weights, count) };
         if let Some(component) = given.iter().position(|weight| !weight.is_finite()) {
             return Err(Fault::Control(ControlError::NotFinite { component }));
         }
         for (k, &weight) in given.iter().enumerate() {
-            lent.weights[k] = lent.clamped(k, weight);
+            lent.arrays.weights[k] = lent.clamped(k, weight);
         }
         Ok(())
     };
@@ -297,9 +279,6 @@ pub unsafe extern "C" fn sinew_controls_set_all(
 ///
 /// `weights`, `weight_count`: at least K; more stay untouched.
 ///
-/// Errors: those of a handle; `TOO_SHORT`, `TOO_LONG`, `OVERLAP`.
-/// Threads: one at a time for each controls handle; another one's use at this moment is noticed.
-///
 /// # Safety
 /// `controls` is NULL or controls; `weights` is NULL or writable for `weight_count` floats.
 #[unsafe(no_mangle)]
@@ -310,20 +289,17 @@ pub unsafe extern "C" fn sinew_controls_get_all(
 ) -> SinewStatus {
     edge(|| {
         let regions = &mut Regions::new();
-        // SAFETY: the caller's promise.
-        let lent = unsafe { lend_controls(controls, regions)? };
-        let count = lent.weights.len();
-        array(weights, weight_count, count, "weights", Access::Write, regions)?;
-        // SAFETY: the caller's promise; checked, and apart from the controls' memory.
-        unsafe { lent.weights.as_ptr().copy_to_nonoverlapping(weights, count) };
+        // SAFETY: the caller's promise, both.
+        unsafe {
+            let lent = lend_controls(controls, regions)?;
+            let own = &*lent.arrays.weights;
+            slice_mut(weights, weight_count, own.len(), "weights", regions)?.copy_from_slice(own);
+        }
         Ok(())
     })
 }
 
 /// All controls to rest.
-///
-/// Errors: those of a handle.
-/// Threads: one at a time for each controls handle; another one's use at this moment is noticed.
 ///
 /// # Safety
 /// `controls` is NULL or controls.
@@ -331,9 +307,57 @@ pub unsafe extern "C" fn sinew_controls_get_all(
 pub unsafe extern "C" fn sinew_controls_reset(controls: *mut SinewControls) -> SinewStatus {
     edge(|| {
         // SAFETY: the caller's promise.
-        unsafe { lend_controls(controls, &mut Regions::new())? }
-            .weights
-            .fill(0.0);
+        let mut lent = unsafe { lend_controls(controls, &mut Regions::new())? };
+        lent.arrays.weights.fill(0.0);
+        Ok(())
+    })
+}
+
+/// Carries weights over by name when a package is exchanged: each control of `to` that has a namesake in `from` takes its
+/// weight, clamped to the new range; the others stay. Play a frame with a new workspace, then close what was there before.
+///
+/// `from_basis`, `from`: what was played until now. `to_basis`, `to`: what takes its place.
+/// `carried`: NULL, or takes how many controls had a namesake.
+///
+/// Errors: `FOREIGN_CONTROLS`, `NOT_FINITE` (something wrote over the weights).
+///
+/// # Safety
+/// The handles are NULL or handles of their kind; `carried` is NULL or writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn sinew_controls_carry(
+    from_basis: *const SinewBasis,
+    from: *const SinewControls,
+    to_basis: *const SinewBasis,
+    to: *mut SinewControls,
+    carried: *mut u32,
+) -> SinewStatus {
+    edge(|| {
+        let regions = &mut Regions::new();
+        let out = Out::optional(carried, "carried", regions)?;
+        // SAFETY: the caller's promise, all.
+        let (from_basis, mut from, to_basis, mut to) = unsafe {
+            (
+                share_basis(from_basis, regions)?,
+                lend_controls(from, regions)?,
+                share_basis(to_basis, regions)?,
+                lend_controls(to, regions)?,
+            )
+        };
+        let weights = Controls::resume(&from_basis.basis, from.weights(&from_basis.basis)?)?;
+        let weights = weights.weights();
+        to.weights(&to_basis.basis)?;
+        let (mut found, mut next) = (0, 0);
+        for (k, component) in to_basis.basis.components().enumerate() {
+            // Most exchanges keep the order: the search begins behind the last namesake.
+            let mut places = (next..weights.len()).chain(0..next);
+            let Some(namesake) = places.find(|&place| from_basis.basis.component(place).name == component.name) else {
+                continue;
+            };
+            to.arrays.weights[k] = to.clamped(k, weights[namesake]);
+            (found, next) = (found + 1, namesake + 1);
+        }
+        // SAFETY: the caller's promise.
+        unsafe { out.write(found) };
         Ok(())
     })
 }

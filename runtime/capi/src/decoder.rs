@@ -1,24 +1,29 @@
 //! The decoder handle: bytes of a knob box, read by the caller from a port of his own, become readings of knobs. What came
 //! waits in a queue in the same memory until it is asked for.
 
-use core::ffi::c_char;
+use core::ffi::{c_char, c_void};
 
-use sinew_runtime::input::protocol::{LINE_BYTES_MAX, SLIP_BYTES_MAX, SNIFF_BYTES_MAX};
-use sinew_runtime::input::{Decoder, KnobEvent, Reading, Settings};
+use sinew_knobs::protocol::{Greeting, LINE_BYTES_MAX, OPENING_BYTES_MAX, SLIP_BYTES_MAX, SNIFF_BYTES_MAX};
+use sinew_knobs::{Decoder, DecoderSettings, KnobEvent, Reading};
 
-use crate::carve;
+use crate::carve::Carver;
 use crate::details::SinewDetails;
 use crate::device::{SinewCounters, SinewDecoderSettings, SinewDeviceInfo, SinewReading};
 use crate::edge::{edge, edge_with_details};
-use crate::fault::Fault;
-use crate::handle::{Body, Handle, Kind};
-use crate::memory::{Access, Out, Regions, SinewLayout, array, handle_memory, present};
+use crate::handle::{Body, Handle};
+use crate::kind::Kind;
+use crate::memory::{Out, Regions, SinewLayout, handle_memory, present, slice, slice_mut, write_text};
 use crate::status::SinewStatus;
 use crate::structs::{self, StructOut};
 use crate::version::check_abi;
 
 /// Readings that wait in a decoder, at most.
 pub const SINEW_DECODER_READINGS: usize = 2048;
+/// Bytes of a buffer that holds any greeting.
+pub const SINEW_GREETING_BYTES: usize = 37;
+
+const _: () = assert!(SINEW_GREETING_BYTES == OPENING_BYTES_MAX);
+
 /// Bytes that a parser holds back: each makes one reading at most, and all of them may do so at once.
 const HELD_BACK: usize = {
     let longest = if LINE_BYTES_MAX > SLIP_BYTES_MAX {
@@ -35,7 +40,7 @@ const HELD_BACK: usize = {
 
 const _: () = assert!(HELD_BACK < SINEW_DECODER_READINGS);
 
-/// Reads one device, whatever it speaks, in memory of yours.
+/// Reads one device, whatever it speaks.
 pub struct SinewDecoder {
     _opaque: (),
 }
@@ -43,6 +48,7 @@ pub struct SinewDecoder {
 struct DecoderBody {
     decoder: Decoder,
     queue: Queue,
+    greeting: Greeting,
     replugs: u64,
     last_value_us: Option<u64>,
 }
@@ -56,53 +62,75 @@ impl DecoderBody {
     fn take(&mut self, now_us: u64, read: impl FnOnce(&mut Decoder, &mut dyn FnMut(KnobEvent))) {
         let before = self.decoder.counters().events;
         let queue = &mut self.queue;
-        read(&mut self.decoder, &mut |event| queue.push(event));
+        read(&mut self.decoder, &mut |event| queue.push(Arrival { now_us, event }));
         if self.decoder.counters().events != before {
             self.last_value_us = Some(now_us);
         }
     }
 }
 
+/// A reading, and when its bytes came.
+#[derive(Clone, Copy)]
+struct Arrival {
+    now_us: u64,
+    event: KnobEvent,
+}
+
 /// A ring of readings.
 struct Queue {
-    ring: &'static mut [KnobEvent],
+    ring: &'static mut [Arrival],
     first: usize,
     count: usize,
     dropped: u64,
 }
 
 impl Queue {
+    fn cut(carver: &mut Carver) -> Self {
+        let nothing = Arrival {
+            now_us: 0,
+            event: KnobEvent {
+                knob: 0,
+                reading: Reading::Steps(0),
+            },
+        };
+        Self {
+            ring: carver.take(SINEW_DECODER_READINGS, nothing),
+            first: 0,
+            count: 0,
+            dropped: 0,
+        }
+    }
+
     fn room(&self) -> usize {
         self.ring.len() - self.count
     }
 
-    fn push(&mut self, event: KnobEvent) {
+    fn push(&mut self, arrival: Arrival) {
         let (end, length) = (self.first + self.count, self.ring.len());
         match self.room() {
             0 => self.dropped += 1,
             _ => {
-                self.ring[end % length] = event;
+                self.ring[end % length] = arrival;
                 self.count += 1;
             }
         }
     }
 
-    fn pop(&mut self) -> Option<KnobEvent> {
+    fn pop(&mut self) -> Option<Arrival> {
         self.count = self.count.checked_sub(1)?;
-        let event = self.ring[self.first];
+        let arrival = self.ring[self.first];
         self.first = (self.first + 1) % self.ring.len();
-        Some(event)
+        Some(arrival)
     }
 }
 
 fn layout() -> SinewLayout {
-    Handle::<DecoderBody>::layout(carve::bytes::<KnobEvent>(SINEW_DECODER_READINGS))
+    let mut carver = Carver::measuring();
+    Queue::cut(&mut carver);
+    Handle::<DecoderBody>::layout(carver.bytes())
 }
 
 /// How much memory a decoder needs; the same for every device.
-///
-/// Errors: `NULL_POINTER`, `MISALIGNED`.
-/// Threads: any.
 ///
 /// # Safety
 /// `layout` is NULL or writable.
@@ -120,12 +148,8 @@ pub unsafe extern "C" fn sinew_decoder_layout(layout: *mut SinewLayout) -> Sinew
 ///
 /// `abi_version`: pass `SINEW_ABI_VERSION`.
 /// `settings`: NULL for the usual ones: the first bytes decide what the device speaks.
-/// `memory`, `memory_bytes`: at least what `sinew_decoder_layout` says; what lies beyond that stays untouched.
-/// `decoder`: takes the handle, which lies at `memory`.
-/// `details`: NULL, or takes the numbers behind a refusal.
 ///
-/// Errors: `WRONG_ABI`, `TOO_SHORT`, `TOO_LONG`, `OVERLAP`, `STRUCT_SIZE`, `UNKNOWN_OPTION`.
-/// Threads: any; one call for one `memory`.
+/// Errors: `WRONG_ABI`, `UNKNOWN_OPTION`.
 ///
 /// # Safety
 /// The pointers are NULL or point to memory of the stated lengths. `memory` stays in place, and is written by nobody else,
@@ -134,7 +158,7 @@ pub unsafe extern "C" fn sinew_decoder_layout(layout: *mut SinewLayout) -> Sinew
 pub unsafe extern "C" fn sinew_decoder_open(
     abi_version: u32,
     settings: *const SinewDecoderSettings,
-    memory: *mut u8,
+    memory: *mut c_void,
     memory_bytes: usize,
     decoder: *mut *mut SinewDecoder,
     details: *mut SinewDetails,
@@ -143,27 +167,19 @@ pub unsafe extern "C" fn sinew_decoder_open(
         check_abi(abi_version)?;
         let out = Out::required(decoder, "decoder", regions)?;
         let (protocol, settings) = if settings.is_null() {
-            (None, Settings::default())
+            (None, DecoderSettings::default())
         } else {
             // SAFETY: the caller's promise.
             unsafe { structs::read(settings, regions)? }.resolve()?
         };
         let layout = layout();
-        handle_memory(memory, memory_bytes, layout, regions)?;
+        let memory = handle_memory(memory, memory_bytes, layout, regions)?;
         let body = |buffers: &'static mut [u8]| {
-            let nothing = KnobEvent {
-                knob: 0,
-                reading: Reading::Steps(0),
-            };
-            let (ring, _) = carve::filled(buffers, nothing, SINEW_DECODER_READINGS);
+            let decoder = Decoder::new(protocol, settings);
             Ok(DecoderBody {
-                decoder: Decoder::new(protocol, settings),
-                queue: Queue {
-                    ring,
-                    first: 0,
-                    count: 0,
-                    dropped: 0,
-                },
+                greeting: Greeting::new(&decoder),
+                decoder,
+                queue: Queue::cut(&mut Carver::carving(buffers)),
                 replugs: 0,
                 last_value_us: None,
             })
@@ -176,68 +192,50 @@ pub unsafe extern "C" fn sinew_decoder_open(
     unsafe { edge_with_details(details, open) }
 }
 
-/// Ends a decoder: later calls with it are refused with `CLOSED_HANDLE` while its memory stands. There is nothing to free,
-/// so this is optional before the memory is given back.
+/// What to send to the device now: ask after each `sinew_decoder_feed`, also one without bytes, and write it to the port. A
+/// device that waits for a greeting gets one as soon as it is known what it speaks, and again each second until it answers; all
+/// others get nothing.
 ///
-/// Errors: those of a handle.
-/// Threads: one at a time for each decoder; another one's use at this moment is noticed.
-///
-/// # Safety
-/// `decoder` is NULL or points to a handle's memory.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn sinew_decoder_close(decoder: *mut SinewDecoder) -> SinewStatus {
-    // SAFETY: the caller's promise.
-    edge(|| unsafe { Handle::<DecoderBody>::close(decoder.cast()) })
-}
-
-/// What to send to the device once after its port was opened, so that it begins: nothing for most.
-///
-/// `bytes`, `capacity`: 37 bytes are always enough.
-/// `length`: takes the number of bytes written.
-///
-/// Errors: those of a handle; `TOO_SHORT` (nothing was written), `OVERLAP`.
-/// Threads: one at a time for each decoder; another one's use at this moment is noticed.
+/// `now_us`: on the clock of `sinew_decoder_feed`.
+/// `bytes`, `capacity`: room for `SINEW_GREETING_BYTES`.
+/// `length`: takes the number of bytes written, nearly always 0.
 ///
 /// # Safety
 /// `decoder` is NULL or a decoder; the others are NULL or writable, `bytes` for `capacity`.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn sinew_decoder_greeting(
     decoder: *mut SinewDecoder,
-    bytes: *mut u8,
+    now_us: u64,
+    bytes: *mut c_void,
     capacity: usize,
     length: *mut usize,
 ) -> SinewStatus {
     edge(|| {
         let regions = &mut Regions::new();
         let out = Out::required(length, "length", regions)?;
+        // SAFETY: the caller's promise, both.
+        let (mut lent, bytes) = unsafe {
+            (
+                Handle::<DecoderBody>::lend(decoder.cast(), regions)?,
+                slice_mut(bytes.cast::<u8>(), capacity, OPENING_BYTES_MAX, "bytes", regions)?,
+            )
+        };
+        let lent = &mut *lent;
+        let mut opening = [0; OPENING_BYTES_MAX];
+        let due = lent.greeting.due(&lent.decoder, now_us, &mut opening);
+        bytes[..due.len()].copy_from_slice(due);
         // SAFETY: the caller's promise.
-        let lent = unsafe { Handle::<DecoderBody>::lend(decoder.cast(), regions)? };
-        let mut greeting = [0; 64];
-        let protocol = lent.decoder.protocol();
-        let written = protocol.map_or(Ok(0), |protocol| protocol.write_opening(&mut greeting));
-        let written = written.map_err(|_| Fault::Internal)?;
-        array(bytes, capacity, written, "bytes", Access::Write, regions)?;
-        // SAFETY: the caller's promise; checked.
-        unsafe {
-            greeting.as_ptr().copy_to_nonoverlapping(bytes, written);
-            out.write(written);
-        }
+        unsafe { out.write(due.len()) };
         Ok(())
     })
 }
 
-/// Feeds bytes of the device's stream, cut anywhere.
+/// Feeds bytes of the device's stream, cut anywhere. Waits for nothing. Bytes that make no sense are counted, never an error.
 ///
-/// `now_us`: microseconds of a clock of yours that never runs back.
+/// `now_us`: when the bytes came, microseconds of a clock of yours that never runs back.
 /// `bytes`, `length`: what the port gave; may be none.
 /// `taken`: takes how many bytes were used. Fewer than `length` when half of `SINEW_DECODER_READINGS` wait: ask for them,
 /// then feed the rest. So no reading of a stream is ever lost here.
-///
-/// Allocates nothing and waits for nothing. Bytes that make no sense are counted, never an error.
-///
-/// Errors: those of a handle; `TOO_LONG`, `OVERLAP`.
-/// Threads: one at a time for each decoder; another one's use at this moment is noticed. A thread that reads the port and one
-/// that asks must take turns.
 ///
 /// # Safety
 /// `decoder` is NULL or a decoder; `bytes` is NULL or readable for `length`; `taken` is NULL or writable.
@@ -245,18 +243,20 @@ pub unsafe extern "C" fn sinew_decoder_greeting(
 pub unsafe extern "C" fn sinew_decoder_feed(
     decoder: *mut SinewDecoder,
     now_us: u64,
-    bytes: *const u8,
+    bytes: *const c_void,
     length: usize,
     taken: *mut usize,
 ) -> SinewStatus {
     edge(|| {
         let regions = &mut Regions::new();
         let out = Out::required(taken, "taken", regions)?;
-        array(bytes, length, length, "bytes", Access::Read, regions)?;
-        // SAFETY: the caller's promise.
-        let mut lent = unsafe { Handle::<DecoderBody>::lend(decoder.cast(), regions)? };
-        // SAFETY: the caller's promise; neither null nor beyond the address space.
-        let mut rest = unsafe { core::slice::from_raw_parts(bytes, length) };
+        // SAFETY: the caller's promise, both.
+        let (mut rest, mut lent) = unsafe {
+            (
+                slice(bytes.cast::<u8>(), length, length, "bytes", regions)?,
+                Handle::<DecoderBody>::lend(decoder.cast(), regions)?,
+            )
+        };
         loop {
             let (now, later) = rest.split_at(rest.len().min(lent.queue.room().saturating_sub(HELD_BACK)));
             if now.is_empty() {
@@ -274,10 +274,7 @@ pub unsafe extern "C" fn sinew_decoder_feed(
 /// Feeds one datagram, whole: OSC as it comes over UDP. What finds no room among the readings that wait is dropped and
 /// counted.
 ///
-/// `now_us`: microseconds of a clock of yours that never runs back.
-///
-/// Errors: those of a handle; `TOO_LONG`, `OVERLAP`.
-/// Threads: one at a time for each decoder; another one's use at this moment is noticed.
+/// `now_us`: when the datagram came, microseconds of a clock of yours that never runs back.
 ///
 /// # Safety
 /// `decoder` is NULL or a decoder; `bytes` is NULL or readable for `length`.
@@ -285,16 +282,18 @@ pub unsafe extern "C" fn sinew_decoder_feed(
 pub unsafe extern "C" fn sinew_decoder_feed_packet(
     decoder: *mut SinewDecoder,
     now_us: u64,
-    bytes: *const u8,
+    bytes: *const c_void,
     length: usize,
 ) -> SinewStatus {
     edge(|| {
         let regions = &mut Regions::new();
-        array(bytes, length, length, "bytes", Access::Read, regions)?;
-        // SAFETY: the caller's promise.
-        let mut lent = unsafe { Handle::<DecoderBody>::lend(decoder.cast(), regions)? };
-        // SAFETY: the caller's promise; neither null nor beyond the address space.
-        let packet = unsafe { core::slice::from_raw_parts(bytes, length) };
+        // SAFETY: the caller's promise, both.
+        let (packet, mut lent) = unsafe {
+            (
+                slice(bytes.cast::<u8>(), length, length, "bytes", regions)?,
+                Handle::<DecoderBody>::lend(decoder.cast(), regions)?,
+            )
+        };
         lent.take(now_us, |decoder, sink| {
             decoder.feed_packet(packet, &mut |event| sink(event))
         });
@@ -302,11 +301,8 @@ pub unsafe extern "C" fn sinew_decoder_feed_packet(
     })
 }
 
-/// The device was plugged in again: what is half read is thrown away. Protocol, names, scales and counters stay, so that a
-/// knob has the same number as before.
-///
-/// Errors: those of a handle.
-/// Threads: one at a time for each decoder; another one's use at this moment is noticed.
+/// The device was plugged in again: what is half read is thrown away, and the device is greeted anew. Protocol, names, scales
+/// and counters stay, so that a knob has the same number as before.
 ///
 /// # Safety
 /// `decoder` is NULL or a decoder.
@@ -316,15 +312,13 @@ pub unsafe extern "C" fn sinew_decoder_replugged(decoder: *mut SinewDecoder) -> 
         // SAFETY: the caller's promise.
         let mut lent = unsafe { Handle::<DecoderBody>::lend(decoder.cast(), &mut Regions::new())? };
         lent.decoder.reset();
+        lent.greeting = Greeting::new(&lent.decoder);
         lent.replugs += 1;
         Ok(())
     })
 }
 
 /// The oldest reading that waits, which then waits no more; `kind` is `SINEW_READING_KIND_NONE` when none does.
-///
-/// Errors: those of a handle; `STRUCT_SIZE`, `OVERLAP`.
-/// Threads: one at a time for each decoder; another one's use at this moment is noticed.
 ///
 /// # Safety
 /// `decoder` is NULL or a decoder; `reading` is NULL or as long as its first member says.
@@ -339,7 +333,10 @@ pub unsafe extern "C" fn sinew_decoder_next(decoder: *mut SinewDecoder, reading:
                 Handle::<DecoderBody>::lend(decoder.cast(), regions)?,
             )
         };
-        out.write(&lent.queue.pop().map_or(SinewReading::NONE, SinewReading::of));
+        let oldest = lent.queue.pop();
+        out.write(&oldest.map_or(SinewReading::NONE, |arrival| {
+            SinewReading::of(arrival.now_us, arrival.event)
+        }));
         Ok(())
     })
 }
@@ -347,9 +344,6 @@ pub unsafe extern "C" fn sinew_decoder_next(decoder: *mut SinewDecoder, reading:
 /// What became of the bytes so far.
 ///
 /// `now_us`: on the clock of `sinew_decoder_feed`, for the age of the last reading.
-///
-/// Errors: those of a handle; `STRUCT_SIZE`, `OVERLAP`.
-/// Threads: one at a time for each decoder; another one's use at this moment is noticed.
 ///
 /// # Safety
 /// `decoder` is NULL or a decoder; `counters` is NULL or as long as its first member says.
@@ -384,9 +378,6 @@ pub unsafe extern "C" fn sinew_decoder_counters(
 
 /// What the decoder knows of its device: what it speaks and how sure that is.
 ///
-/// Errors: those of a handle; `STRUCT_SIZE`, `OVERLAP`.
-/// Threads: one at a time for each decoder; another one's use at this moment is noticed.
-///
 /// # Safety
 /// `decoder` is NULL or a decoder; `info` is NULL or as long as its first member says.
 #[unsafe(no_mangle)]
@@ -408,9 +399,6 @@ pub unsafe extern "C" fn sinew_decoder_info(decoder: *const SinewDecoder, info: 
 /// What the device calls a knob: its label, OSC address, or from a HELLO; UTF-8, ended by NUL, empty where it has no name.
 /// `SINEW_KNOB_NAME_BYTES` are always enough.
 ///
-/// Errors: those of a handle; `TOO_SHORT` (nothing was written), `OVERLAP`.
-/// Threads: one at a time for each decoder; another one's use at this moment is noticed.
-///
 /// # Safety
 /// `decoder` is NULL or a decoder; `name` is NULL or writable for `name_bytes`.
 #[unsafe(no_mangle)]
@@ -426,13 +414,7 @@ pub unsafe extern "C" fn sinew_decoder_knob_name(
         // SAFETY: the caller's promise.
         let shared = unsafe { Handle::<DecoderBody>::share(decoder.cast(), regions)? };
         let known = u16::try_from(knob).ok().and_then(|knob| shared.decoder.name_of(knob));
-        let known = known.unwrap_or_default().as_bytes();
-        array(name, name_bytes, known.len() + 1, "name", Access::Write, regions)?;
-        // SAFETY: the buffer is that long, and apart from the decoder.
-        unsafe {
-            known.as_ptr().copy_to_nonoverlapping(name.cast(), known.len());
-            name.add(known.len()).write(0);
-        }
-        Ok(())
+        // SAFETY: the caller's promise.
+        unsafe { write_text(known.unwrap_or_default(), name, name_bytes, "name", regions) }
     })
 }

@@ -8,15 +8,32 @@ use crate::status::SinewStatus;
 use crate::structs::{GrowingStruct, StructOut};
 use crate::text;
 
-/// Bytes of the text in `SinewDetails`, with the NUL.
-pub const SINEW_DETAILS_TEXT_BYTES: usize = 228;
+/// Bytes of the sentence in `SinewDetails`, with the NUL.
+pub const SINEW_DETAILS_TEXT_BYTES: usize = 216;
 
-/// Why a call was refused. Set `struct_bytes` to `sizeof(SinewDetails)`; the rest is written when a call that takes the
-/// struct returns anything but `SINEW_STATUS_OK`, and is left alone otherwise.
+/// What can be done about a package that does not open.
+#[repr(i32)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SinewPackageReason {
+    /// No package was refused.
+    None = 0,
+    /// The bytes are something else.
+    NotAPackage = 1,
+    /// Of a format version, or of a kind, that this library does not know: update the library, or train and bake again.
+    Version = 2,
+    /// Sound, but not to be played: `sinew bake` makes a baked package of a compact one.
+    WrongKind = 3,
+    /// Cut off or changed on its way: copy it again.
+    Damaged = 4,
+    /// Whole, but it breaks a rule of the format: what wrote it has a defect.
+    Rule = 5,
+}
+
+/// Why a call was refused: written when a call returns anything but `SINEW_STATUS_OK`, else left alone.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct SinewDetails {
-    /// `sizeof(SinewDetails)`.
+    /// Set by `SINEW_INIT`.
     pub struct_bytes: usize,
     /// Index of the element at fault: control, vertex, element of a package's field. 0 where the fault has none.
     pub index: u64,
@@ -26,9 +43,13 @@ pub struct SinewDetails {
     pub actual: u64,
     /// The status that the call returned.
     pub status: SinewStatus,
+    /// Why a package does not open.
+    pub reason: SinewPackageReason,
     /// One English sentence for a log, UTF-8, ended by NUL; cut off if it is too long.
     pub text: [c_char; SINEW_DETAILS_TEXT_BYTES],
 }
+
+const _: () = assert!(size_of::<SinewDetails>() == 256 || size_of::<usize>() < 8);
 
 // SAFETY: `repr(C)`, the size first. It is only written, never read.
 unsafe impl GrowingStruct for SinewDetails {
@@ -63,6 +84,7 @@ impl DetailsOut {
             expected: numbers.expected,
             actual: numbers.actual,
             status: fault.status(),
+            reason: fault.reason(),
             text: text::of(fault),
         });
     }

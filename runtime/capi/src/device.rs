@@ -3,10 +3,11 @@
 use core::ffi::c_char;
 use core::fmt;
 
-use sinew_runtime::input::protocol::{Coding, FIRMWARE_BYTES_MAX, MidiSettings, NAME_BYTES_MAX, Pairing, Recognition};
-use sinew_runtime::input::{Counters, Decoder, FullScale, KnobEvent, Protocol, Reading, Settings};
+use sinew_knobs::protocol::{Coding, FIRMWARE_BYTES_MAX, MidiSettings, NAME_BYTES_MAX, Pairing, Recognition};
+use sinew_knobs::{Counters, Decoder, DecoderSettings, FullScale, KnobEvent, Protocol, Reading};
 
 use crate::fault::Fault;
+use crate::number;
 use crate::structs::{GrowingStruct, choice};
 use crate::text;
 
@@ -80,16 +81,16 @@ pub enum SinewMidiPairing {
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct SinewDecoderSettings {
-    /// `sizeof(SinewDecoderSettings)`.
+    /// Set by `SINEW_INIT`.
     pub struct_bytes: usize,
-    /// A `SinewProtocol`; 0: the first bytes decide.
-    pub protocol: i32,
+    /// What the device speaks.
+    pub protocol: number::SinewProtocol,
     /// The largest value of lines, Firmata reports and OSC integers, at most 65535; 0: learned.
     pub full_scale: u32,
-    /// A `SinewMidiCoding`, of all controllers.
-    pub midi_coding: i32,
-    /// A `SinewMidiPairing`.
-    pub midi_pairing: i32,
+    /// Of all controllers.
+    pub midi_coding: number::SinewMidiCoding,
+    /// Of all channels.
+    pub midi_pairing: number::SinewMidiPairing,
 }
 
 // SAFETY: `repr(C)`, the size first, integers only.
@@ -99,7 +100,7 @@ unsafe impl GrowingStruct for SinewDecoderSettings {
 }
 
 impl SinewDecoderSettings {
-    pub(crate) fn resolve(&self) -> Result<(Option<Protocol>, Settings), Fault> {
+    pub(crate) fn resolve(&self) -> Result<(Option<Protocol>, DecoderSettings), Fault> {
         let [lines, packets, midi, firmata, osc] = Protocol::ALL.map(Some);
         let protocol = choice(
             "settings.protocol",
@@ -126,7 +127,14 @@ impl SinewDecoderSettings {
                 });
             }
         };
-        Ok((protocol, Settings { full_scale, midi }))
+        Ok((
+            protocol,
+            DecoderSettings {
+                full_scale,
+                midi,
+                ..DecoderSettings::default()
+            },
+        ))
     }
 }
 
@@ -142,14 +150,16 @@ pub enum SinewReadingKind {
     Steps = 2,
 }
 
-/// One reading of one knob. Set `struct_bytes` to `sizeof(SinewReading)` before the call.
+/// One reading of one knob.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct SinewReading {
-    /// `sizeof(SinewReading)`.
+    /// Set by `SINEW_INIT`.
     pub struct_bytes: usize,
-    /// A `SinewReadingKind`.
-    pub kind: i32,
+    /// When its bytes came, on your clock, microseconds.
+    pub time_us: u64,
+    /// What `value` says.
+    pub kind: number::SinewReadingKind,
     /// Address of the knob on its device, at most 65535: column of a line, MIDI `channel * 128 + controller`, pin, or the
     /// number of a name in order of appearance.
     pub knob: u32,
@@ -169,19 +179,21 @@ impl SinewReading {
     /// Nothing waits.
     pub(crate) const NONE: Self = Self {
         struct_bytes: size_of::<Self>(),
+        time_us: 0,
         kind: SinewReadingKind::None as i32,
         knob: 0,
         value: 0,
         full_scale: 0,
     };
 
-    pub(crate) fn of(event: KnobEvent) -> Self {
+    pub(crate) fn of(time_us: u64, event: KnobEvent) -> Self {
         let (kind, value, full_scale) = match event.reading {
             Reading::Position { value, full_scale } => (SinewReadingKind::Position, value.into(), full_scale.into()),
             Reading::Steps(steps) => (SinewReadingKind::Steps, steps.into(), 0),
         };
         Self {
             struct_bytes: size_of::<Self>(),
+            time_us,
             kind: kind as i32,
             knob: event.knob.into(),
             value,
@@ -210,12 +222,11 @@ impl SinewReading {
     }
 }
 
-/// What became of the bytes. Set `struct_bytes` to `sizeof(SinewCounters)` before the call. Totals since the decoder was
-/// opened.
+/// What became of the bytes. Totals since the decoder was opened.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct SinewCounters {
-    /// `sizeof(SinewCounters)`.
+    /// Set by `SINEW_INIT`.
     pub struct_bytes: usize,
     /// Bytes fed.
     pub bytes: u64,
@@ -294,11 +305,11 @@ pub enum SinewRecognition {
     Found = 4,
 }
 
-/// What a decoder knows of its device. Set `struct_bytes` to `sizeof(SinewDeviceInfo)` before the call.
+/// What a decoder knows of its device.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct SinewDeviceInfo {
-    /// `sizeof(SinewDeviceInfo)`.
+    /// Set by `SINEW_INIT`.
     pub struct_bytes: usize,
     /// How it came to the protocol.
     pub recognition: SinewRecognition,

@@ -1,12 +1,12 @@
-//! Faults: why a call was refused, with its numbers. Plain values without heap; the edge makes a status of them, and
-//! details where the caller wants some.
+//! Faults: why a call was refused, and the sentence that says so. Plain values without heap; `classify.rs` makes a status and
+//! numbers of them.
 
 use core::fmt;
 
-use sinew_runtime::input::MapError;
+use sinew_knobs::MapError;
 use sinew_runtime::{ControlError, FrameError, HandleError, OpenError, OutputError, WorkspaceError};
 
-use crate::handle::Kind;
+use crate::kind::Kind;
 
 /// Why a call was refused.
 #[derive(Debug, Clone, Copy)]
@@ -77,7 +77,7 @@ pub(crate) enum Fault {
     Control(ControlError),
     Workspace(WorkspaceError),
     Frame(FrameError),
-    Hold(HandleError),
+    Pin(HandleError),
     Output(OutputError),
     Map(MapError),
     NoSuchInstance {
@@ -133,7 +133,7 @@ impl From<FrameError> for Fault {
 
 impl From<HandleError> for Fault {
     fn from(error: HandleError) -> Self {
-        Self::Hold(error)
+        Self::Pin(error)
     }
 }
 
@@ -146,169 +146,6 @@ impl From<OutputError> for Fault {
 impl From<MapError> for Fault {
     fn from(error: MapError) -> Self {
         Self::Map(error)
-    }
-}
-
-/// The numbers of a fault; zero where it has none.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(crate) struct Numbers {
-    pub(crate) index: u64,
-    pub(crate) expected: u64,
-    pub(crate) actual: u64,
-}
-
-impl Numbers {
-    fn index(index: usize) -> Self {
-        Self {
-            index: index as u64,
-            ..Self::default()
-        }
-    }
-
-    fn counts(expected: usize, actual: usize) -> Self {
-        Self {
-            index: 0,
-            expected: expected as u64,
-            actual: actual as u64,
-        }
-    }
-
-    fn indexed(index: usize, expected: usize, actual: usize) -> Self {
-        Self {
-            index: index as u64,
-            ..Self::counts(expected, actual)
-        }
-    }
-}
-
-impl Fault {
-    pub(crate) fn numbers(&self) -> Numbers {
-        match *self {
-            Self::Misaligned { alignment, .. } => Numbers::counts(alignment, 0),
-            Self::TooShort { expected, actual, .. }
-            | Self::StructSize { expected, actual, .. }
-            | Self::ElementSize { expected, actual, .. } => Numbers::counts(expected, actual),
-            Self::TooLong { actual, .. } => Numbers::counts(isize::MAX as usize, actual),
-            Self::UnknownOption { at, .. } => Numbers::index(at),
-            Self::WrongAbi { expected, actual } => Numbers::counts(expected as usize, actual as usize),
-            Self::Open(error) => open_numbers(error),
-            Self::Control(ControlError::NoSuchComponent {
-                component,
-                component_count,
-            })
-            | Self::Frame(FrameError::NoSuchComponent {
-                component,
-                component_count,
-            }) => Numbers::indexed(component, component_count, component),
-            Self::Control(ControlError::NotFinite { component }) => Numbers::index(component),
-            Self::Control(ControlError::WrongLength { expected, actual })
-            | Self::Frame(FrameError::WrongLength { expected, actual, .. }) => Numbers::counts(expected, actual),
-            Self::Workspace(WorkspaceError::TooSmall {
-                required_bytes,
-                actual_bytes,
-            }) => Numbers::counts(required_bytes, actual_bytes),
-            Self::Frame(FrameError::FeatureNotFinite { vertex } | FrameError::NotFinite { vertex }) => {
-                Numbers::index(vertex)
-            }
-            Self::Hold(error) => hold_numbers(error),
-            Self::Output(error) => output_numbers(error),
-            Self::Map(error) => map_numbers(error),
-            Self::NoSuchInstance {
-                instance,
-                instance_count,
-            } => Numbers::indexed(instance, instance_count, instance),
-            Self::NoSuchKnob { knob, knob_count } => Numbers::indexed(knob, knob_count, knob),
-            Self::NoSuchPage { page, page_count } => Numbers::indexed(page, page_count, page),
-            Self::BadAddress { address } => Numbers::counts(u16::MAX.into(), address as usize),
-            Self::TooMany { limit, actual, .. } => Numbers::counts(limit, actual),
-            Self::BadReading { value, full_scale } => Numbers::counts(full_scale as usize, value.max(0) as usize),
-            _ => Numbers::default(),
-        }
-    }
-}
-
-fn hold_numbers(error: HandleError) -> Numbers {
-    match error {
-        HandleError::NoSuchVertex { vertex, vertex_count } => Numbers::indexed(vertex, vertex_count, vertex),
-        HandleError::NoSuchComponent {
-            component,
-            component_count,
-        } => Numbers::indexed(component, component_count, component),
-        HandleError::AlreadyHeld { vertex }
-        | HandleError::NotHeld { vertex }
-        | HandleError::TargetNotFinite { vertex }
-        | HandleError::NotFinite { vertex } => Numbers::index(vertex),
-        HandleError::Full { capacity } => Numbers::counts(capacity, capacity),
-        _ => Numbers::default(),
-    }
-}
-
-fn output_numbers(error: OutputError) -> Numbers {
-    match error {
-        OutputError::ScratchTooShort { expected, actual } => Numbers::counts(expected, actual),
-        OutputError::StrideTooShort {
-            required_bytes,
-            stride_bytes,
-            ..
-        } => Numbers::counts(required_bytes, stride_bytes),
-        OutputError::BufferTooShort {
-            required_bytes,
-            actual_bytes,
-            ..
-        } => Numbers::counts(required_bytes, actual_bytes),
-        _ => Numbers::default(),
-    }
-}
-
-fn map_numbers(error: MapError) -> Numbers {
-    match error {
-        MapError::SameAddress { address } => Numbers::index(address.into()),
-        MapError::Calibration { knob } | MapError::Smoothing { knob } | MapError::Step { knob } => Numbers::index(knob),
-        MapError::NoSuchKnob { binding, knob } => Numbers::indexed(binding, 0, knob.into()),
-        MapError::NoSuchControl {
-            control,
-            component_count,
-        } => Numbers::indexed(control.into(), component_count, control.into()),
-        MapError::Response { binding, .. } | MapError::TreeKnobBound { binding } => Numbers::index(binding),
-        MapError::TwoHands { first, second } => Numbers::indexed(second, first, second),
-        MapError::TreeResponse { control, .. } => Numbers::index(control),
-        MapError::NoSuchPage { page } => Numbers::index(page.into()),
-        _ => Numbers::default(),
-    }
-}
-
-fn open_numbers(error: OpenError) -> Numbers {
-    match error {
-        OpenError::TooShort { actual } => Numbers::counts(sinew_formats::package::HEADER_BYTES, actual),
-        OpenError::UnsupportedVersion { found, latest, .. } => Numbers::counts(latest.into(), found.into()),
-        OpenError::UnknownKind { found } => Numbers::counts(0, found.into()),
-        OpenError::Truncated { expected, actual }
-        | OpenError::TrailingBytes { expected, actual }
-        | OpenError::CountMismatch { expected, actual, .. } => Numbers {
-            index: 0,
-            expected,
-            actual,
-        },
-        OpenError::Misaligned { required } => Numbers::counts(required, 0),
-        OpenError::PayloadCorrupt { expected, actual } => Numbers::counts(expected as usize, actual as usize),
-        OpenError::IndexOutOfRange {
-            index, value, limit, ..
-        } => Numbers::indexed(index, limit as usize, value as usize),
-        OpenError::TooFew { least, actual, .. } => Numbers::counts(least, actual),
-        OpenError::TooMany { limit, actual, .. } => Numbers::counts(limit, actual),
-        OpenError::NotFinite { index, .. }
-        | OpenError::OutOfRange { index, .. }
-        | OpenError::NotPositive { index, .. }
-        | OpenError::PivotNotPositive { index }
-        | OpenError::NotAscending { index, .. }
-        | OpenError::NotContiguous { index, .. }
-        | OpenError::NotAPermutation { index, .. }
-        | OpenError::NotSymmetric { index, .. }
-        | OpenError::NameInvalid { index, .. } => Numbers::index(index),
-        OpenError::ParentAfterChild { block } => Numbers::index(block),
-        OpenError::BitmapTail { component } | OpenError::RangeWithoutZero { component } => Numbers::index(component),
-        OpenError::NameDuplicate { first, second } => Numbers::indexed(second, first, second),
-        _ => Numbers::default(),
     }
 }
 
@@ -326,7 +163,7 @@ impl fmt::Display for Fault {
             Self::Overlap { first, second } => write!(out, "`{first}` and `{second}` share memory"),
             Self::StructSize { name, expected, actual } => write!(
                 out,
-                "`{name}.struct_bytes` is {actual}; set it to sizeof, which is {expected} in this library"
+                "`{name}.struct_bytes` is {actual}; begin with SINEW_INIT, or set it to sizeof, which is {expected} in this library"
             ),
             Self::ElementSize { name, expected, actual } => write!(
                 out,
@@ -352,7 +189,7 @@ impl fmt::Display for Fault {
             Self::Control(error) => error.fmt(out),
             Self::Workspace(error) => error.fmt(out),
             Self::Frame(error) => error.fmt(out),
-            Self::Hold(error) => error.fmt(out),
+            Self::Pin(error) => error.fmt(out),
             Self::Output(error) => error.fmt(out),
             Self::Map(error) => error.fmt(out),
             Self::NoSuchInstance {

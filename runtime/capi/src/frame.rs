@@ -8,17 +8,16 @@ use crate::details::SinewDetails;
 use crate::edge::edge_with_details;
 use crate::fault::Fault;
 use crate::handle::{Handle, Lent};
-use crate::memory::{Access, Regions, array};
+use crate::memory::{Access, Regions, slice_mut};
 use crate::status::SinewStatus;
 use crate::structs::{self, GrowingStruct, StructOut};
 use crate::workspace::{SinewWorkspace, WorkspaceBody};
 
-/// Where a frame writes. Start from zeros (`SinewFrameOptions options = {0};`), then set `struct_bytes` and what you
-/// want: zero means "not wanted" or "as usual" for every member, also for those that later versions add.
+/// Where a frame writes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct SinewFrameOptions {
-    /// `sizeof(SinewFrameOptions)`.
+    /// Set by `SINEW_INIT`.
     pub struct_bytes: usize,
     /// Takes the deformed positions, xyz for each vertex, source order, units of the source. Not NULL.
     pub positions: *mut f32,
@@ -46,11 +45,11 @@ pub enum SinewFrameOutcome {
     Unchanged = 2,
 }
 
-/// What a frame tells besides its buffers. Set `struct_bytes` to `sizeof(SinewFrameReport)` before the call.
+/// What a frame tells besides its buffers.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct SinewFrameReport {
-    /// `sizeof(SinewFrameReport)`.
+    /// Set by `SINEW_INIT`.
     pub struct_bytes: usize,
     /// What the frame had to do.
     pub outcome: SinewFrameOutcome,
@@ -63,26 +62,19 @@ pub struct SinewFrameReport {
 // SAFETY: `repr(C)`, the size first. It is only written, never read.
 unsafe impl GrowingStruct for SinewFrameReport {
     const NAME: &'static str = "report";
-    // The first version ended behind `outcome` and its padding.
-    const FIRST_BYTES: usize = core::mem::offset_of!(Self, minimum).next_multiple_of(align_of::<Self>());
+    const FIRST_BYTES: usize = size_of::<Self>();
 }
 
 /// Plays one frame: the rest shape deformed by the controls, on the tier that the workspace was made for.
 ///
-/// `basis`, `workspace`, `controls`: made for the same content. Positions, normals, options, report, details, package and
-/// the memory of the handles must not overlap.
-/// `options`: where to write.
+/// `basis`, `workspace`, `controls`: made for the same content.
 /// `report`: NULL, or takes what the frame had to do.
-/// `details`: NULL, or takes the numbers behind a refusal.
 ///
-/// Allocates nothing and waits for nothing. Components at rest are skipped; where no control moved since the workspace's last
-/// frame, only the outputs are written.
+/// Waits for nothing. Components at rest are skipped; where no control moved since the workspace's last frame, only the outputs
+/// are written.
 ///
-/// Errors: those of a handle; `FOREIGN_WORKSPACE`, `FOREIGN_CONTROLS`, `TOO_SHORT`, `TOO_LONG`, `OVERLAP`,
-/// `STRUCT_SIZE`, `UNKNOWN_OPTION`, `NOT_FINITE` (something wrote over the weights), `FRAME_OVERFLOW` (then positions and
-/// normals are those of the rest shape).
-/// Threads: any number at a time for one basis; one at a time for each workspace and each controls handle, and another
-/// one's use at this moment is noticed.
+/// Errors: `FOREIGN_WORKSPACE`, `FOREIGN_CONTROLS`, `UNKNOWN_OPTION`, `NOT_FINITE` (something wrote over the weights),
+/// `FRAME_OVERFLOW` (then positions and normals are those of the rest shape).
 ///
 /// # Safety
 /// The handles are NULL or handles of their kind; the others are NULL or point to memory of the stated lengths.
@@ -149,10 +141,10 @@ impl Target {
             let workspace: Lent<'_, WorkspaceBody> = Handle::lend(self.workspace.cast(), regions)?;
             (workspace, lend_controls(self.controls, regions)?)
         };
-        controls.check_basis(basis)?;
+        let weights = controls.weights(basis)?;
         // SAFETY: the caller's promise.
         let (positions, normals) = unsafe { self.outputs(basis.vertex_count(), regions)? };
-        let controls = Controls::resume(basis, &mut *controls.weights)?;
+        let controls = Controls::resume(basis, weights)?;
         let job = Frame {
             basis,
             controls: &controls,
@@ -223,7 +215,7 @@ unsafe fn vectors<'b>(
     name: &'static str,
     regions: &mut Regions,
 ) -> Result<&'b mut [[f32; 3]], Fault> {
-    array(floats, room, 3 * vertex_count, name, Access::Write, regions)?;
-    // SAFETY: the caller's promise; checked, and apart from all that was added to the regions.
-    Ok(unsafe { core::slice::from_raw_parts_mut(floats.cast(), vertex_count) })
+    // SAFETY: the caller's promise.
+    let floats = unsafe { slice_mut(floats, room, 3 * vertex_count, name, regions)? };
+    Ok(floats.as_chunks_mut().0)
 }

@@ -3,76 +3,17 @@
 //! refused. Memory that was given back to an allocator cannot be told for certain; the canaries find it by chance.
 
 use core::cell::UnsafeCell;
+use core::ffi::c_void;
 use core::ops::{Deref, DerefMut};
 use core::sync::atomic::{AtomicI32, AtomicU32, Ordering};
 
 use crate::fault::Fault;
+use crate::kind::Kind;
 use crate::memory::{Access, Region, Regions, SinewLayout, present};
 
 /// Start of a handle and of the buffers behind it: a cache line, and the widest vector register.
 pub(crate) const ALIGNMENT: usize = 64;
 const CANARY_BYTES: usize = size_of::<u64>();
-
-const BASIS: u32 = u32::from_le_bytes(*b"SnwB");
-const WORKSPACE: u32 = u32::from_le_bytes(*b"SnwW");
-const CONTROLS: u32 = u32::from_le_bytes(*b"SnwC");
-const DECODER: u32 = u32::from_le_bytes(*b"SnwD");
-const SURFACE: u32 = u32::from_le_bytes(*b"SnwS");
-const HANDLES: u32 = u32::from_le_bytes(*b"SnwH");
-const BATCH: u32 = u32::from_le_bytes(*b"SnwN");
-const CLOSED: u32 = u32::from_le_bytes(*b"Snw0");
-
-/// Which handle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
-    Basis,
-    Workspace,
-    Controls,
-    Decoder,
-    Surface,
-    Handles,
-    Batch,
-}
-
-impl Kind {
-    const ALL: [Self; 7] = [
-        Self::Basis,
-        Self::Workspace,
-        Self::Controls,
-        Self::Decoder,
-        Self::Surface,
-        Self::Handles,
-        Self::Batch,
-    ];
-
-    const fn tag(self) -> u32 {
-        match self {
-            Self::Basis => BASIS,
-            Self::Workspace => WORKSPACE,
-            Self::Controls => CONTROLS,
-            Self::Decoder => DECODER,
-            Self::Surface => SURFACE,
-            Self::Handles => HANDLES,
-            Self::Batch => BATCH,
-        }
-    }
-
-    pub(crate) const fn name(self) -> &'static str {
-        match self {
-            Self::Basis => "basis",
-            Self::Workspace => "workspace",
-            Self::Controls => "controls",
-            Self::Decoder => "decoder",
-            Self::Surface => "surface",
-            Self::Handles => "handles",
-            Self::Batch => "batch",
-        }
-    }
-
-    fn of(tag: u32) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.tag() == tag)
-    }
-}
 
 /// What a kind of handle holds. Nothing in it needs dropping: memory may simply be taken away.
 pub(crate) trait Body {
@@ -91,6 +32,41 @@ struct Head {
     region_bytes: usize,
     /// Follows from the two above; the canary at the end is a copy.
     seal: u64,
+}
+
+impl Head {
+    /// Looks at what the caller gives as a handle, of whatever kind.
+    ///
+    /// # Safety
+    /// `pointer` is null, or readable for the size of a handle of any kind; if a handle was made there, its memory is still
+    /// the caller's.
+    unsafe fn check<'h>(pointer: *const Self, name: &'static str) -> Result<(&'h Self, Kind), Fault> {
+        present(pointer, name)?;
+        // SAFETY: readable by the caller's promise, aligned, and any bits are a head.
+        let head = unsafe { &*pointer };
+        let kind = match head.tag.load(Ordering::Acquire) {
+            Kind::CLOSED => return Err(Fault::ClosedHandle { name }),
+            tag => Kind::of(tag).ok_or(Fault::NotAHandle { name })?,
+        };
+        if head.address != pointer.addr() {
+            return Err(Fault::MovedHandle { name });
+        }
+        let expected = seal(kind, head.address, head.region_bytes);
+        // SAFETY: the seal shows that the length is the one that `create` wrote, so the canary is in the caller's memory.
+        let whole = head.seal == expected
+            && unsafe { pointer.byte_add(head.region_bytes - CANARY_BYTES).cast::<u64>().read() } == expected;
+        if whole {
+            Ok((head, kind))
+        } else {
+            Err(Fault::DamagedHandle { name })
+        }
+    }
+
+    /// Takes the handle for a call that writes it.
+    fn lock(&self, name: &'static str) -> Result<(), Fault> {
+        let free = self.lock.compare_exchange(0, -1, Ordering::Acquire, Ordering::Relaxed);
+        free.map(|_| ()).map_err(|_| Fault::InUse { name })
+    }
 }
 
 #[repr(C)]
@@ -160,29 +136,13 @@ impl<B: Body> Handle<B> {
     /// `pointer` is null, or readable for the size of a handle of any kind; if a handle was made there, its memory is still
     /// the caller's.
     unsafe fn check<'h>(pointer: *const Self) -> Result<&'h Self, Fault> {
-        let name = Self::NAME;
-        present(pointer, name)?;
-        // SAFETY: readable by the caller's promise, aligned, and any bits are a head.
-        let head = unsafe { &*pointer.cast::<Head>() };
-        match head.tag.load(Ordering::Acquire) {
-            tag if tag == B::KIND.tag() => {}
-            CLOSED => return Err(Fault::ClosedHandle { name }),
-            tag => {
-                return Err(match Kind::of(tag) {
-                    Some(found) => Fault::WrongHandle { name, found },
-                    None => Fault::NotAHandle { name },
-                });
-            }
-        }
-        if head.address != pointer.addr() {
-            return Err(Fault::MovedHandle { name });
-        }
-        let expected = seal(B::KIND, head.address, head.region_bytes);
-        // SAFETY: the seal shows that the length is the one that `create` wrote, so the canary is in the caller's memory.
-        let whole = head.seal == expected
-            && unsafe { pointer.byte_add(head.region_bytes - CANARY_BYTES).cast::<u64>().read() } == expected;
-        if !whole {
-            return Err(Fault::DamagedHandle { name });
+        // SAFETY: the caller's promise.
+        let (_, kind) = unsafe { Head::check(pointer.cast(), Self::NAME)? };
+        if kind != B::KIND {
+            return Err(Fault::WrongHandle {
+                name: Self::NAME,
+                found: kind,
+            });
         }
         // SAFETY: `create` wrote a whole handle of this kind here, and it stands.
         Ok(unsafe { &*pointer })
@@ -227,28 +187,27 @@ impl<B: Body> Handle<B> {
         // SAFETY: the caller's promise.
         let handle = unsafe { Self::check(pointer)? };
         regions.add(handle.region(Access::Write)?)?;
-        handle
-            .head
-            .lock
-            .compare_exchange(0, -1, Ordering::Acquire, Ordering::Relaxed)
-            .map_err(|_| Fault::InUse { name: Self::NAME })?;
+        handle.head.lock(Self::NAME)?;
         let unwinding_before = std::thread::panicking();
         Ok(Lent {
             handle,
             unwinding_before,
         })
     }
+}
 
-    /// Ends a handle: from now on it is refused by name, for as long as its memory stands.
-    ///
-    /// # Safety
-    /// As for `check`.
-    pub(crate) unsafe fn close(pointer: *mut Self) -> Result<(), Fault> {
-        // SAFETY: the caller's promise.
-        let lent = unsafe { Self::lend(pointer, &mut Regions::new())? };
-        lent.handle.head.tag.store(CLOSED, Ordering::Release);
-        Ok(())
-    }
+/// Ends a handle of any kind: from now on it is refused by name, for as long as its memory stands.
+///
+/// # Safety
+/// As for `Handle::check`.
+pub(crate) unsafe fn close(pointer: *mut c_void) -> Result<(), Fault> {
+    const NAME: &str = "handle";
+    // SAFETY: the caller's promise.
+    let (head, _) = unsafe { Head::check(pointer.cast_const().cast(), NAME)? };
+    head.lock(NAME)?;
+    head.tag.store(Kind::CLOSED, Ordering::Release);
+    head.lock.store(0, Ordering::Release);
+    Ok(())
 }
 
 /// A handle that is being read.
@@ -297,7 +256,7 @@ impl<B> Drop for Lent<'_, B> {
     fn drop(&mut self) {
         // What a panic left half done must not be used again.
         if std::thread::panicking() && !self.unwinding_before {
-            self.handle.head.tag.store(CLOSED, Ordering::Relaxed);
+            self.handle.head.tag.store(Kind::CLOSED, Ordering::Relaxed);
         }
         self.handle.head.lock.store(0, Ordering::Release);
     }
@@ -362,7 +321,7 @@ mod tests {
             };
             writing.0 = 8;
             assert_eq!(status(handle), crate::SinewStatus::InUse);
-            assert!(Handle::close(handle).is_err());
+            assert!(close(handle.cast()).is_err());
             drop(writing);
         }
         assert!(matches!(read(handle), Ok(8)));
@@ -410,7 +369,7 @@ mod tests {
         }
         let handle = number(&mut memory);
         // SAFETY: the handle stands.
-        assert!(unsafe { Handle::close(handle) }.is_ok());
+        assert!(unsafe { close(handle.cast()) }.is_ok());
         assert_eq!(status(handle), crate::SinewStatus::ClosedHandle);
     }
 }

@@ -1,13 +1,15 @@
 //! The caller's memory: pointers become regions only after null, alignment and length are checked, and no region that
 //! is written may touch another.
 
+use core::ffi::{c_char, c_void};
+
 use crate::fault::Fault;
 
 /// How much memory a handle needs. Fixed for ever, hence without a size of its own.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SinewLayout {
-    /// Bytes.
+    /// Bytes: a multiple of the alignment.
     pub size_bytes: usize,
     /// The memory must start at a multiple of this: a power of two, at most 64.
     pub alignment: usize,
@@ -107,8 +109,9 @@ fn aligned<T>(pointer: *const T, alignment: usize, name: &'static str) -> Result
     Ok(())
 }
 
-/// A caller's array of `count` elements that must hold at least `least`; the region is the `least` that are used.
-pub(crate) fn array<T>(
+/// A caller's array of `count` elements that must hold at least `least`; the region is the `least` that are used. No
+/// elements may be no pointer.
+fn array<T>(
     pointer: *const T,
     count: usize,
     least: usize,
@@ -116,7 +119,9 @@ pub(crate) fn array<T>(
     access: Access,
     regions: &mut Regions,
 ) -> Result<(), Fault> {
-    present(pointer, name)?;
+    if count > 0 {
+        present(pointer, name)?;
+    }
     if count < least {
         return Err(Fault::TooShort {
             name,
@@ -124,19 +129,80 @@ pub(crate) fn array<T>(
             actual: count,
         });
     }
+    if least == 0 {
+        return Ok(());
+    }
     // The whole must be possible, not only the part in use: a length gone wrong is noticed.
     let whole = count.saturating_mul(size_of::<T>());
     Region::new(pointer, whole, name, access)?;
     regions.add(Region::new(pointer, least * size_of::<T>(), name, access)?)
 }
 
-/// Memory for a handle.
+/// The first `least` of a caller's `count` elements, to be read.
+///
+/// # Safety
+/// `pointer` is null or readable for `count` elements, which are valid for any bits, as long as the slice is used.
+pub(crate) unsafe fn slice<'b, T>(
+    pointer: *const T,
+    count: usize,
+    least: usize,
+    name: &'static str,
+    regions: &mut Regions,
+) -> Result<&'b [T], Fault> {
+    array(pointer, count, least, name, Access::Read, regions)?;
+    if least == 0 {
+        return Ok(&[]);
+    }
+    // SAFETY: the caller's promise; neither null nor beyond the address space.
+    Ok(unsafe { core::slice::from_raw_parts(pointer, least) })
+}
+
+/// The first `least` of a caller's `count` elements, to be written.
+///
+/// # Safety
+/// `pointer` is null or writable for `count` elements, which are valid for any bits, as long as the slice is used.
+pub(crate) unsafe fn slice_mut<'b, T>(
+    pointer: *mut T,
+    count: usize,
+    least: usize,
+    name: &'static str,
+    regions: &mut Regions,
+) -> Result<&'b mut [T], Fault> {
+    array(pointer, count, least, name, Access::Write, regions)?;
+    if least == 0 {
+        return Ok(&mut []);
+    }
+    // SAFETY: the caller's promise; checked, and apart from all that was added to the regions.
+    Ok(unsafe { core::slice::from_raw_parts_mut(pointer, least) })
+}
+
+/// Writes a text and its NUL to a caller's buffer; nothing where it is too short.
+///
+/// # Safety
+/// `buffer` is null or writable for `buffer_bytes`.
+pub(crate) unsafe fn write_text(
+    text: &str,
+    buffer: *mut c_char,
+    buffer_bytes: usize,
+    name: &'static str,
+    regions: &mut Regions,
+) -> Result<(), Fault> {
+    // SAFETY: the caller's promise.
+    let buffer = unsafe { slice_mut(buffer.cast::<u8>(), buffer_bytes, text.len() + 1, name, regions)? };
+    let (own, nul) = buffer.split_at_mut(text.len());
+    own.copy_from_slice(text.as_bytes());
+    nul.fill(0);
+    Ok(())
+}
+
+/// Memory for a handle, or several: checked against their layout.
 pub(crate) fn handle_memory(
-    memory: *mut u8,
+    memory: *mut c_void,
     memory_bytes: usize,
     layout: SinewLayout,
     regions: &mut Regions,
-) -> Result<(), Fault> {
+) -> Result<*mut u8, Fault> {
+    let memory: *mut u8 = memory.cast();
     aligned(memory, layout.alignment, "memory")?;
     array(
         memory,
@@ -145,7 +211,8 @@ pub(crate) fn handle_memory(
         "memory",
         Access::Write,
         regions,
-    )
+    )?;
+    Ok(memory)
 }
 
 /// A place for one result, checked, to be written once all else is.

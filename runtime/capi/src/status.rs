@@ -1,199 +1,102 @@
-//! Status codes: one for every fault. The codes of released versions keep their meaning.
+//! Status codes: one for every fault, in one table. The codes of released versions keep their meaning.
 
 use core::ffi::{CStr, c_char};
 
-use crate::status_texts::TABLE;
+/// Makes the enum, and the table of what logs say, of rows `number, variant, "NAME", "sentence"`.
+macro_rules! statuses {
+    ($($code:literal $variant:ident $name:literal $text:literal)*) => {
+        /// What a call returns. Unless a status says otherwise, a call that returns anything but `SINEW_STATUS_OK` has changed
+        /// nothing. New codes may be added: treat an unknown one as a fault.
+        #[repr(i32)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum SinewStatus {
+            $(#[doc = $text] $variant = $code,)*
+        }
 
-/// What a call returns. Unless a status says otherwise, a call that returns anything but `SINEW_STATUS_OK` has changed
-/// nothing. New codes may be added: treat an unknown one as a fault.
-#[repr(i32)]
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum SinewStatus {
-    /// Done.
-    Ok = 0,
-    /// A pointer that must not be NULL is.
-    NullPointer = 1,
-    /// A pointer does not start at a multiple of its type's alignment, or memory not at that of its layout.
-    Misaligned = 2,
-    /// Memory or a buffer is shorter than it must be; the layout call or the count says how long.
-    TooShort = 3,
-    /// A length that no object has: it would reach beyond the address space.
-    TooLong = 4,
-    /// Memory that this call writes overlaps other memory that it uses.
-    Overlap = 5,
-    /// A struct's first member is not its size; set it to `sizeof`.
-    StructSize = 6,
-    /// A struct of a newer header asks for something that this library does not know.
-    UnknownOption = 7,
-    /// The header belongs to another interface version than the library.
-    WrongAbi = 8,
-    /// Not a handle: never made, or its memory was freed or written over.
-    NotAHandle = 10,
-    /// A handle of another kind.
-    WrongHandle = 11,
-    /// The handle was closed, or a call that wrote it ended with `SINEW_STATUS_INTERNAL`.
-    ClosedHandle = 12,
-    /// The handle was copied or moved from where it was made; make it anew where it shall stay.
-    MovedHandle = 13,
-    /// Something wrote over the handle's memory.
-    DamagedHandle = 14,
-    /// Another thread is using the handle at this moment.
-    InUse = 15,
-    /// The workspace was made for other content than the basis has now.
-    ForeignWorkspace = 16,
-    /// The controls were made for other content than the basis has now.
-    ForeignControls = 17,
-    /// The index of a control is not less than their count.
-    NoSuchControl = 20,
-    /// No control has this name.
-    NoSuchName = 21,
-    /// A weight is NaN or infinite; the weights stay as they were.
-    NotFinite = 22,
-    /// The weights are so large that a position left f32. The outputs hold the rest shape, the workspace is at rest.
-    FrameOverflow = 23,
-    /// The package has no fast tier; `sinew bake` makes one.
-    NoFastTier = 24,
-    /// The workspace is of the fast tier, and the call needs one of the exact tier.
-    NeedsExactTier = 25,
-    /// The handles were made for other content than the basis has now.
-    ForeignHandles = 26,
-    /// The index of a vertex is not less than their count.
-    NoSuchVertex = 27,
-    /// The vertex is held already; give it a new target.
-    AlreadyHeld = 28,
-    /// The vertex is not held.
-    NotHeld = 29,
-    /// As many vertices are held as there is room for.
-    HandlesFull = 30,
-    /// The weights are so large that a held vertex left f32; the controls stay as they were.
-    HeldOverflow = 31,
-    /// Normals or tangents are to be written, and no normals were given.
-    NoNormals = 32,
-    /// Tangents or texture coordinates are to be written, and the package has no texture coordinates.
-    NoTexture = 33,
-    /// The stride of an attribute is less than its size.
-    StrideTooShort = 34,
-    /// Two attributes of a vertex would write into each other, or interleave with different strides.
-    AttributesOverlap = 35,
-    /// The index of an instance is not less than their count.
-    NoSuchInstance = 36,
-    /// The index of a knob is not less than their count.
-    NoSuchKnob = 40,
-    /// No binding is on this page.
-    NoSuchPage = 41,
-    /// No knob says this: an unknown kind of reading, a value above its full scale, a number that does not fit.
-    BadReading = 42,
-    /// Two knobs have one address.
-    KnobTwice = 43,
-    /// A knob's calibration leaves no range to turn in.
-    BadCalibration = 44,
-    /// A knob's step is not above 0 and at most 1.
-    BadStep = 45,
-    /// Two bindings move one control on the same page.
-    TwoHands = 46,
-    /// The tree has no coarse knob, more knobs than there are, or one that a binding has too.
-    BadTree = 47,
-    /// A number of a response is out of range, or its limits do not fit the control.
-    BadResponse = 48,
-    /// More knobs or bindings than a surface takes.
-    TooMany = 49,
-    /// A defect of the library, stopped at its edge; the handles that the call was writing are closed, its outputs may be half
-    /// written. Please report it.
-    Internal = 99,
-    /// Fewer bytes than a package's header.
-    PackageTooShort = 100,
-    /// The first bytes are not a package's.
-    PackageWrongMagic = 101,
-    /// The header's checksum does not fit.
-    PackageHeaderCorrupt = 102,
-    /// A format version that this library does not read.
-    PackageUnsupportedVersion = 103,
-    /// Reserved bytes of the header are in use.
-    PackageReservedNotZero = 104,
-    /// The header names an unknown kind of package.
-    PackageUnknownKind = 105,
-    /// A compact package where a baked one is needed; `sinew bake` makes one.
-    PackageWrongKind = 106,
-    /// The package ends early.
-    PackageTruncated = 107,
-    /// Bytes follow the package.
-    PackageTrailingBytes = 108,
-    /// The bytes do not start at a multiple of 16.
-    PackageMisaligned = 109,
-    /// The payload's checksum does not fit.
-    PackagePayloadCorrupt = 110,
-    /// The content id is not the content's.
-    PackageContentIdMismatch = 111,
-    /// The payload is not an archive of its kind.
-    PackageMalformed = 112,
-    /// A number is NaN or infinite.
-    PackageNotFinite = 113,
-    /// A number lies outside its range.
-    PackageOutOfRange = 114,
-    /// A number that must be above zero is not.
-    PackageNotPositive = 115,
-    /// A pivot of the factor is not above zero.
-    PackagePivotNotPositive = 116,
-    /// An index points past the end.
-    PackageIndexOutOfRange = 117,
-    /// Two counts that must agree do not.
-    PackageCountMismatch = 118,
-    /// A field has fewer elements than make sense.
-    PackageTooFew = 119,
-    /// A field has more elements than the format allows.
-    PackageTooMany = 120,
-    /// Elements that must ascend do not.
-    PackageNotAscending = 121,
-    /// A block's parent is missing or comes after it.
-    PackageParentAfterChild = 122,
-    /// Parts that must follow one another do not.
-    PackageNotContiguous = 123,
-    /// The two vertex orders are not each other's inverse.
-    PackageNotAPermutation = 124,
-    /// An edge differs in its two directions.
-    PackageNotSymmetric = 125,
-    /// A bit beyond the last vertex is set.
-    PackageBitmapTail = 126,
-    /// The range of a control leaves out zero.
-    PackageRangeWithoutZero = 127,
-    /// A name is empty, too long or has control characters.
-    PackageNameInvalid = 128,
-    /// Two controls have one name.
-    PackageNameDuplicate = 129,
-    /// The skin weights of a vertex of the fast tier do not sum to one.
-    PackageSkinWeightSum = 130,
-    /// A triangle of render vertices does not stand for the corners of its triangle.
-    PackageRenderFaceDiffers = 131,
+        /// Status, its name in the header, its sentence.
+        const TABLE: &[(SinewStatus, &str, &str)] = &[
+            $((SinewStatus::$variant, concat!("SINEW_STATUS_", $name, "\0"), concat!($text, "\0")),)*
+        ];
+    };
 }
 
-fn entry(status: i32) -> Option<&'static (SinewStatus, &'static CStr, &'static CStr)> {
+// A gap of the numbers ends a room of the header: frame, pins, buffers, batches, knobs.
+statuses! {
+    0 Ok "OK" "done"
+    1 NullPointer "NULL_POINTER" "a pointer that must not be NULL is"
+    2 Misaligned "MISALIGNED" "a pointer does not start at a multiple of the alignment it needs"
+    3 TooShort "TOO_SHORT" "memory or a buffer is shorter than it must be"
+    4 TooLong "TOO_LONG" "a length reaches beyond the address space"
+    5 Overlap "OVERLAP" "memory that the call writes overlaps other memory that it uses"
+    6 StructSize "STRUCT_SIZE" "a struct's first member is not its size; begin with SINEW_INIT"
+    7 UnknownOption "UNKNOWN_OPTION" "a struct asks for something that this library is too old for"
+    8 WrongAbi "WRONG_ABI" "header and library have different interface versions"
+    9 PackageRefused "PACKAGE_REFUSED" "the package does not open; the details say why"
+    10 NotAHandle "NOT_A_HANDLE" "not a handle, or its memory was freed or written over"
+    11 WrongHandle "WRONG_HANDLE" "a handle of another kind"
+    12 ClosedHandle "CLOSED_HANDLE" "the handle was closed, or a call that wrote it ended with INTERNAL"
+    13 MovedHandle "MOVED_HANDLE" "the handle was copied or moved; make it anew where it shall stay"
+    14 DamagedHandle "DAMAGED_HANDLE" "something wrote over the handle's memory"
+    15 InUse "IN_USE" "another thread is using the handle at this moment"
+    16 ForeignWorkspace "FOREIGN_WORKSPACE" "the workspace was made for another basis; make one for this basis"
+    17 ForeignControls "FOREIGN_CONTROLS" "the controls were made for another basis; make some for this basis"
+    18 ForeignPins "FOREIGN_PINS" "the pins were made for another basis; make some for this basis"
+    20 NoSuchControl "NO_SUCH_CONTROL" "there is no control of this index"
+    21 NoSuchName "NO_SUCH_NAME" "there is no control of this name"
+    22 NotFinite "NOT_FINITE" "a number is NaN or infinite; what it was meant for stays as it was"
+    23 FrameOverflow "FRAME_OVERFLOW" "the weights are so large that a position or a bone left f32; outputs and workspace are at rest"
+    24 NoBones "NO_BONES" "the package has no bones; bake it with some, or use the exact tier"
+    25 NeedsExactTier "NEEDS_EXACT_TIER" "the call needs a workspace of the exact tier"
+    26 NeedsBones "NEEDS_BONES" "the call needs a workspace of the bones"
+    30 NoSuchVertex "NO_SUCH_VERTEX" "there is no vertex of this index"
+    31 AlreadyPinned "ALREADY_PINNED" "the vertex is pinned already; move its target"
+    32 NotPinned "NOT_PINNED" "the vertex is not pinned"
+    33 PinsFull "PINS_FULL" "as many vertices are pinned as there is room for"
+    34 PinOverflow "PIN_OVERFLOW" "the weights are so large that a pinned vertex left f32; the controls stay"
+    40 NoNormals "NO_NORMALS" "normals or tangents are to be written and no normals were given"
+    41 NoTexture "NO_TEXTURE" "the package has no texture coordinates, and so no tangents"
+    42 StrideTooShort "STRIDE_TOO_SHORT" "the stride of an attribute is less than its size"
+    43 AttributesOverlap "ATTRIBUTES_OVERLAP" "two attributes overlap, or interleave with different strides"
+    50 NoSuchInstance "NO_SUCH_INSTANCE" "there is no instance of this index"
+    60 NoSuchKnob "NO_SUCH_KNOB" "there is no knob of this index"
+    61 NoSuchPage "NO_SUCH_PAGE" "no binding is on this page"
+    62 BadReading "BAD_READING" "no knob says this: an unknown kind, or a number outside its range"
+    63 KnobTwice "KNOB_TWICE" "two knobs have one address"
+    64 BadCalibration "BAD_CALIBRATION" "the calibration of a knob leaves no range to turn in"
+    65 BadStep "BAD_STEP" "the step of a knob must be above 0 and at most 1"
+    66 TwoHands "TWO_HANDS" "two bindings move one control on the same page"
+    67 BadTree "BAD_TREE" "the tree needs a coarse knob, and knobs that are there and that no binding has"
+    68 BadResponse "BAD_RESPONSE" "a response has a number out of range, or limits that do not fit its control"
+    69 TooMany "TOO_MANY" "more knobs or bindings than a surface takes"
+    99 Internal "INTERNAL" "a defect of the library, please report it; what the call was writing is closed"
+}
+
+const UNKNOWN: &CStr = c"unknown status";
+
+fn row(status: i32) -> Option<&'static (SinewStatus, &'static str, &'static str)> {
     TABLE.iter().find(|(known, ..)| *known as i32 == status)
 }
 
 /// The status of a number that was one.
 pub(crate) fn known(status: i32) -> SinewStatus {
-    entry(status).map_or(SinewStatus::Internal, |(status, ..)| *status)
+    row(status).map_or(SinewStatus::Internal, |(status, ..)| *status)
 }
 
 /// What a status means, in one English sentence without a full stop. Never NULL, never freed, unknown codes included.
-///
-/// Threads: any.
 #[unsafe(no_mangle)]
 pub extern "C" fn sinew_status_text(status: i32) -> *const c_char {
-    entry(status).map_or(c"unknown status", |(_, _, text)| text).as_ptr()
+    // The table ends its texts with NUL.
+    row(status).map_or(UNKNOWN.as_ptr(), |(.., text)| text.as_ptr().cast())
 }
 
 /// The name of a status as this header spells it, for logs. Never NULL, never freed, unknown codes included.
-///
-/// Threads: any.
 #[unsafe(no_mangle)]
 pub extern "C" fn sinew_status_name(status: i32) -> *const c_char {
-    entry(status).map_or(c"unknown status", |(_, name, _)| name).as_ptr()
+    row(status).map_or(UNKNOWN.as_ptr(), |(_, name, _)| name.as_ptr().cast())
 }
 
 #[cfg(test)]
 mod tests {
-    use core::ffi::CStr;
     use std::collections::BTreeSet;
 
     use super::*;
@@ -204,23 +107,24 @@ mod tests {
     }
 
     #[test]
-    fn every_status_has_its_own_name_and_text() {
-        let source = include_str!("status.rs");
-        let variants = source
-            .lines()
-            .filter(|line| line.ends_with(',') && line.contains(" = "))
-            .count();
-        assert_eq!(TABLE.len(), variants, "every status of the enum is in the table");
-        let names: BTreeSet<&CStr> = TABLE.iter().map(|(_, name, _)| *name).collect();
-        let texts: BTreeSet<&CStr> = TABLE.iter().map(|(_, _, text)| *text).collect();
-        assert_eq!((names.len(), texts.len()), (TABLE.len(), TABLE.len()));
-        for (status, name, _) in TABLE {
-            // What cbindgen makes of the variant.
-            let letters = format!("SinewStatus{status:?}");
-            let plain = name.to_str().expect("UTF-8").replace('_', "");
-            assert!(plain.eq_ignore_ascii_case(&letters), "{plain} {letters}");
+    fn every_status_has_a_name_like_its_variant_and_a_sentence_of_its_own() {
+        let mut texts = BTreeSet::new();
+        for &(status, name, sentence) in TABLE {
+            let plain = name.replace(['_', '\0'], "");
+            assert!(
+                plain.eq_ignore_ascii_case(&format!("SinewStatus{status:?}")),
+                "{plain} {status:?}"
+            );
+            assert_eq!(
+                name.matches('\0').count() + sentence.matches('\0').count(),
+                2,
+                "{status:?}"
+            );
+            assert!(texts.insert(sentence), "{status:?}");
+            assert_eq!(known(status as i32), status);
         }
         assert_eq!(text(sinew_status_name(5)), "SINEW_STATUS_OVERLAP");
+        assert_eq!(text(sinew_status_text(0)), "done");
         assert_eq!(text(sinew_status_text(i32::MIN)), "unknown status");
         assert_eq!(text(sinew_status_name(-1)), "unknown status");
     }

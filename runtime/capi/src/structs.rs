@@ -188,3 +188,81 @@ pub(crate) fn choice<T: Copy>(name: &'static str, value: i32, choices: &[T]) -> 
     let chosen = usize::try_from(value).ok().and_then(|index| choices.get(index));
     chosen.copied().ok_or(Fault::UnknownChoice { name, value })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::SinewStatus;
+
+    /// A struct of the second version, and what the third will have.
+    #[repr(C)]
+    #[derive(Clone, Copy)]
+    struct Grown {
+        struct_bytes: usize,
+        first: u64,
+        second: u64,
+        third: u64,
+    }
+
+    /// What this library knows of it.
+    #[repr(C)]
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    struct Known {
+        struct_bytes: usize,
+        first: u64,
+        second: u64,
+    }
+
+    // SAFETY: `repr(C)`, the size first, numbers only.
+    unsafe impl GrowingStruct for Known {
+        const NAME: &'static str = "grown";
+        const FIRST_BYTES: usize = core::mem::offset_of!(Known, second);
+    }
+
+    fn grown(fields: usize, third: u64) -> Grown {
+        Grown {
+            struct_bytes: size_of::<usize>() + 8 * fields,
+            first: 1,
+            second: 2,
+            third,
+        }
+    }
+
+    #[test]
+    fn inputs_of_older_and_newer_programs_are_read() {
+        let known = |input: &Grown| {
+            let pointer = (&raw const *input).cast::<Known>();
+            // SAFETY: as long as it says.
+            unsafe { read(pointer, &mut Regions::new()) }.map(|known| (known.first, known.second))
+        };
+        assert!(
+            matches!(known(&grown(1, 7)), Ok((1, 0))),
+            "the second member is not there"
+        );
+        assert!(matches!(known(&grown(2, 7)), Ok((1, 2))));
+        assert!(matches!(known(&grown(3, 0)), Ok((1, 2))), "the third asks for nothing");
+        let refused = |fields, third| known(&grown(fields, third)).map_err(|fault| fault.status()).err();
+        assert_eq!(refused(3, 7), Some(SinewStatus::UnknownOption));
+        assert_eq!(refused(0, 0), Some(SinewStatus::StructSize));
+    }
+
+    #[test]
+    fn outputs_of_older_and_newer_programs_are_written_as_far_as_both_know() {
+        for (fields, expected) in [(1, [10, 2, 7]), (2, [10, 20, 7]), (3, [10, 20, 7])] {
+            let mut output = grown(fields, 7);
+            let struct_bytes = output.struct_bytes;
+            let pointer = (&raw mut output).cast::<Known>();
+            // SAFETY: as long as it says.
+            let Ok(out) = (unsafe { StructOut::required(pointer, &mut Regions::new()) }) else {
+                panic!("sound")
+            };
+            out.write(&Known {
+                struct_bytes: 0,
+                first: 10,
+                second: 20,
+            });
+            assert_eq!([output.first, output.second, output.third], expected);
+            assert_eq!(output.struct_bytes, struct_bytes);
+        }
+    }
+}

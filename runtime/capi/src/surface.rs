@@ -1,27 +1,30 @@
 //! The surface handle: readings of a device's knobs become weights of controls, with takeover, pages and failsafe. Made for
 //! one basis, whose package it refers to; may move any controls of the same content.
 
-use sinew_runtime::input::{
-    Binding, ControlMap, ControlSurface, Knob, KnobState, SlotState, SurfaceError, SurfaceLayout,
+use core::ffi::c_void;
+
+use sinew_knobs::{
+    Binding, ControlMap, ControlSurface, Knob, KnobState, SlotState, SurfaceError, SurfaceLayout, SurfaceMemory,
 };
 use sinew_runtime::{Controls, FrameError};
 
 use crate::basis::{SinewBasis, share_basis};
-use crate::carve;
+use crate::carve::Carver;
 use crate::controls::{SinewControls, lend_controls};
 use crate::details::SinewDetails;
 use crate::device::SinewReading;
 use crate::edge::{edge, edge_with_details};
 use crate::fault::Fault;
-use crate::handle::{Body, Handle, Kind, Lent, Shared};
+use crate::handle::{Body, Handle, Lent, Shared};
+use crate::kind::Kind;
 use crate::memory::{Out, Region, Regions, SinewLayout, handle_memory};
+use crate::number;
 use crate::status::SinewStatus;
 use crate::structs::{self, StructOut};
 use crate::surface_map::{Records, SinewSurfaceSettings};
 use crate::surface_state::{self, SinewKnobState, SinewSurfaceStatus};
 
-/// One device's knobs on the controls of one basis, in memory of yours. Refers to the package's bytes as the basis does:
-/// keep them in place, unchanged, until the last use of the surface.
+/// One device's knobs on the controls of one basis. Refers to the package's bytes, as the basis does.
 pub struct SinewSurface {
     _opaque: (),
 }
@@ -53,20 +56,36 @@ unsafe fn share<'h>(surface: *const SinewSurface, regions: &mut Regions) -> Resu
     Ok(shared)
 }
 
-fn buffer_bytes(map: &ControlMap<'_>, bindings: &[Binding]) -> usize {
-    let layout = SurfaceLayout::for_map(map);
-    carve::bytes::<Knob<'static>>(layout.knob_count)
-        + carve::bytes::<Binding>(bindings.len())
-        + carve::bytes::<KnobState>(layout.knob_count)
-        + carve::bytes::<SlotState>(layout.slot_count)
+/// The arrays of a surface.
+struct Arrays {
+    knobs: &'static mut [Knob<'static>],
+    bindings: &'static mut [Binding],
+    states: &'static mut [KnobState],
+    slots: &'static mut [SlotState],
+    left: &'static mut [f32],
+}
+
+impl Arrays {
+    fn cut(carver: &mut Carver, layout: SurfaceLayout, binding_count: usize) -> Self {
+        Self {
+            knobs: carver.take(layout.knob_count, Knob::new(0, "")),
+            bindings: carver.take(binding_count, Binding::default()),
+            states: carver.take(layout.knob_count, KnobState::default()),
+            slots: carver.take(layout.slot_count, SlotState::default()),
+            left: carver.take(layout.control_count, f32::NAN),
+        }
+    }
+}
+
+fn layout(map: &ControlMap<'_>, bindings: &[Binding]) -> SinewLayout {
+    let mut carver = Carver::measuring();
+    Arrays::cut(&mut carver, SurfaceLayout::for_map(map), bindings.len());
+    Handle::<SurfaceBody>::layout(carver.bytes())
 }
 
 /// How much memory a surface with these settings needs. Checks the settings as `sinew_surface_create` does.
 ///
-/// `details`: NULL, or takes the numbers behind a refusal.
-///
-/// Errors: those of a handle and of `sinew_surface_create`; `OVERLAP`.
-/// Threads: any number at a time.
+/// Errors: those of `sinew_surface_create`.
 ///
 /// # Safety
 /// `basis` is NULL or a basis; `settings` is NULL or as long as its first member says, and its arrays as long as it says;
@@ -84,8 +103,7 @@ pub unsafe extern "C" fn sinew_surface_layout(
         unsafe {
             let shared = share_basis(basis, regions)?;
             let records = Records::read(&structs::read(settings, regions)?, &shared.basis, regions)?;
-            let bytes = buffer_bytes(&records.map(&shared.basis)?, records.bindings());
-            out.write(Handle::<SurfaceBody>::layout(bytes));
+            out.write(self::layout(&records.map(&shared.basis)?, records.bindings()));
         }
         Ok(())
     };
@@ -95,15 +113,8 @@ pub unsafe extern "C" fn sinew_surface_layout(
 
 /// Makes a surface that has heard nothing yet and holds every weight. The settings are copied.
 ///
-/// `memory`, `memory_bytes`: at least what `sinew_surface_layout` says for these settings; what lies beyond that stays
-/// untouched.
-/// `surface`: takes the handle, which lies at `memory`.
-/// `details`: NULL, or takes the numbers behind a refusal.
-///
-/// Errors: those of a handle; `TOO_SHORT`, `TOO_LONG`, `OVERLAP`, `STRUCT_SIZE`, `UNKNOWN_OPTION`, `TOO_MANY`,
-/// `KNOB_TWICE`, `BAD_READING` (an address above 65535), `BAD_CALIBRATION`, `BAD_STEP`, `NO_SUCH_KNOB`,
-/// `NO_SUCH_CONTROL`, `NO_SUCH_PAGE`, `TWO_HANDS`, `BAD_TREE`, `BAD_RESPONSE`.
-/// Threads: any number at a time, each with `memory` of its own.
+/// Errors: `UNKNOWN_OPTION`, `TOO_MANY`, `KNOB_TWICE`, `BAD_READING` (an address above 65535), `BAD_CALIBRATION`, `BAD_STEP`,
+/// `NO_SUCH_KNOB`, `NO_SUCH_CONTROL`, `NO_SUCH_PAGE`, `TWO_HANDS`, `BAD_TREE`, `BAD_RESPONSE`.
 ///
 /// # Safety
 /// As for `sinew_surface_layout`; `memory` stays in place, and is written by nobody else, until the last use of the
@@ -112,7 +123,7 @@ pub unsafe extern "C" fn sinew_surface_layout(
 pub unsafe extern "C" fn sinew_surface_create(
     basis: *const SinewBasis,
     settings: *const SinewSurfaceSettings,
-    memory: *mut u8,
+    memory: *mut c_void,
     memory_bytes: usize,
     surface: *mut *mut SinewSurface,
     details: *mut SinewDetails,
@@ -126,17 +137,28 @@ pub unsafe extern "C" fn sinew_surface_create(
             (shared, records)
         };
         let map = records.map(&shared.basis)?;
-        let counts = SurfaceLayout::for_map(&map);
-        let layout = Handle::<SurfaceBody>::layout(buffer_bytes(&map, records.bindings()));
-        handle_memory(memory, memory_bytes, layout, regions)?;
+        let layout = layout(&map, records.bindings());
+        let memory = handle_memory(memory, memory_bytes, layout, regions)?;
         let body = |buffers: &'static mut [u8]| {
-            let (knobs, buffers) = carve::copied(buffers, records.knobs());
-            let (bindings, buffers) = carve::copied(buffers, records.bindings());
-            let (states, buffers) = carve::filled(buffers, KnobState::default(), counts.knob_count);
-            let (slots, _) = carve::filled(buffers, SlotState::default(), counts.slot_count);
+            let mut carver = Carver::carving(buffers);
+            let arrays = Arrays::cut(&mut carver, SurfaceLayout::for_map(&map), records.bindings().len());
+            let Arrays {
+                knobs,
+                bindings,
+                states,
+                slots,
+                left,
+            } = arrays;
+            knobs.copy_from_slice(records.knobs());
+            bindings.copy_from_slice(records.bindings());
+            let memory = SurfaceMemory {
+                knobs: states,
+                slots,
+                left,
+            };
             // The same records were a map above, so neither fails.
             let map = ControlMap::new(shared.basis, knobs, bindings, &[], records.tree)?;
-            let surface = ControlSurface::new(map, records.settings, states, slots).map_err(|_| Fault::Internal)?;
+            let surface = ControlSurface::new(map, records.settings, memory).map_err(|_| Fault::Internal)?;
             Ok(SurfaceBody {
                 surface,
                 package: shared.package(),
@@ -150,50 +172,25 @@ pub unsafe extern "C" fn sinew_surface_create(
     unsafe { edge_with_details(details, create) }
 }
 
-/// Ends a surface: later calls with it are refused with `CLOSED_HANDLE` while its memory stands. There is nothing to free,
-/// so this is optional before the memory is given back.
+/// Reads a knob: a reading of `sinew_decoder_next`, or a slider of yours. No control moves before the next
+/// `sinew_surface_advance`. A device thought lost that speaks is back. An address that no knob has is counted, not refused.
 ///
-/// Errors: those of a handle.
-/// Threads: one at a time for each surface; another one's use at this moment is noticed.
-///
-/// # Safety
-/// `surface` is NULL or points to a handle's memory.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn sinew_surface_close(surface: *mut SinewSurface) -> SinewStatus {
-    // SAFETY: the caller's promise.
-    edge(|| unsafe { Handle::<SurfaceBody>::close(surface.cast()) })
-}
-
-/// Takes a reading, as it arrives: from `sinew_decoder_next`, or a slider of yours. No control moves before the next
-/// `sinew_surface_advance`. A device thought lost that speaks is back.
-///
-/// `now_us`: microseconds of a clock of yours that never runs back.
-///
-/// Errors: those of a handle; `STRUCT_SIZE`, `UNKNOWN_OPTION`, `BAD_READING`, `OVERLAP`. An address that no knob has is
-/// counted, not refused.
-/// Threads: one at a time for each surface; another one's use at this moment is noticed.
+/// Errors: `UNKNOWN_OPTION`, `BAD_READING`.
 ///
 /// # Safety
 /// `surface` is NULL or a surface; `reading` is NULL or as long as its first member says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn sinew_surface_take(
-    surface: *mut SinewSurface,
-    now_us: u64,
-    reading: *const SinewReading,
-) -> SinewStatus {
+pub unsafe extern "C" fn sinew_surface_read(surface: *mut SinewSurface, reading: *const SinewReading) -> SinewStatus {
     edge(|| {
         let regions = &mut Regions::new();
         // SAFETY: the caller's promise, both.
         let (reading, mut lent) = unsafe { (structs::read(reading, regions)?, lend(surface, regions)?) };
-        lent.surface.event(now_us, reading.event()?);
+        lent.surface.event(reading.time_us, reading.event()?);
         Ok(())
     })
 }
 
 /// The device is gone: the pose holds, then eases to rest.
-///
-/// Errors: those of a handle.
-/// Threads: one at a time for each surface; another one's use at this moment is noticed.
 ///
 /// # Safety
 /// `surface` is NULL or a surface.
@@ -209,9 +206,6 @@ pub unsafe extern "C" fn sinew_surface_unplugged(surface: *mut SinewSurface, now
 /// The device is back: nothing moves until each knob has picked up its controls, whatever its takeover. See
 /// `sinew_decoder_replugged` too.
 ///
-/// Errors: those of a handle.
-/// Threads: one at a time for each surface; another one's use at this moment is noticed.
-///
 /// # Safety
 /// `surface` is NULL or a surface.
 #[unsafe(no_mangle)]
@@ -225,16 +219,18 @@ pub unsafe extern "C" fn sinew_surface_replugged(surface: *mut SinewSurface, now
 
 /// Does what a button would: stop, pages.
 ///
-/// `command`: a `SinewCommand`.
 /// `argument`: of `SINEW_COMMAND_FOCUS` and `SINEW_COMMAND_PAGE`; not looked at for the others.
 ///
-/// Errors: those of a handle; `UNKNOWN_OPTION`, `NO_SUCH_CONTROL`, `NO_SUCH_PAGE`.
-/// Threads: one at a time for each surface; another one's use at this moment is noticed.
+/// Errors: `UNKNOWN_OPTION`, `NO_SUCH_CONTROL`, `NO_SUCH_PAGE`.
 ///
 /// # Safety
 /// `surface` is NULL or a surface.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn sinew_surface_command(surface: *mut SinewSurface, command: i32, argument: u32) -> SinewStatus {
+pub unsafe extern "C" fn sinew_surface_command(
+    surface: *mut SinewSurface,
+    command: number::SinewCommand,
+    argument: u32,
+) -> SinewStatus {
     edge(|| {
         // SAFETY: the caller's promise.
         let mut lent = unsafe { lend(surface, &mut Regions::new())? };
@@ -248,12 +244,8 @@ pub unsafe extern "C" fn sinew_surface_command(surface: *mut SinewSurface, comma
 /// never faster than its slew limit. Time that stands still or runs back moves nothing.
 ///
 /// `controls`: of the content that the surface was made for.
-/// `details`: NULL, or takes the numbers behind a refusal.
 ///
-/// Allocates nothing and waits for nothing.
-///
-/// Errors: those of a handle; `FOREIGN_CONTROLS`, `NOT_FINITE` (something wrote over the weights), `OVERLAP`, `STRUCT_SIZE`.
-/// Threads: one at a time for each surface and each controls handle; another one's use at this moment is noticed.
+/// Errors: `FOREIGN_CONTROLS`, `NOT_FINITE` (something wrote over the weights).
 ///
 /// # Safety
 /// The handles are NULL or handles of their kind; `details` is NULL or as long as its first member says.
@@ -268,8 +260,7 @@ pub unsafe extern "C" fn sinew_surface_advance(
         // SAFETY: the caller's promise, both.
         let (mut surface, mut controls) = unsafe { (lend(surface, regions)?, lend_controls(controls, regions)?) };
         let basis = *surface.surface.map().basis();
-        controls.check_basis(&basis)?;
-        let mut controls = Controls::resume(&basis, &mut *controls.weights)?;
+        let mut controls = Controls::resume(&basis, controls.weights(&basis)?)?;
         match surface.surface.advance(now_us, &mut controls) {
             Ok(()) => Ok(()),
             Err(SurfaceError::ForeignControls) => Err(Fault::Frame(FrameError::ForeignControls)),
@@ -284,8 +275,7 @@ pub unsafe extern "C" fn sinew_surface_advance(
 ///
 /// `knob`: index of the knob on the surface.
 ///
-/// Errors: those of a handle; `NO_SUCH_KNOB`, `STRUCT_SIZE`, `OVERLAP`.
-/// Threads: one at a time for each surface; another one's use at this moment is noticed.
+/// Errors: `NO_SUCH_KNOB`.
 ///
 /// # Safety
 /// `surface` is NULL or a surface; `state` is NULL or as long as its first member says.
@@ -309,9 +299,6 @@ pub unsafe extern "C" fn sinew_surface_knob(
 }
 
 /// How the surface and its device are doing.
-///
-/// Errors: those of a handle; `STRUCT_SIZE`, `OVERLAP`.
-/// Threads: one at a time for each surface; another one's use at this moment is noticed.
 ///
 /// # Safety
 /// `surface` is NULL or a surface; `status` is NULL or as long as its first member says.

@@ -1,15 +1,16 @@
 //! What a surface is made from: structs of the caller's, checked, become the runtime's map. Before anything is written the
 //! whole map has been built once on the stack, so what does not fit is refused with nothing changed.
 
-use sinew_runtime::Basis;
-use sinew_runtime::input::{
+use sinew_knobs::{
     Binding, Centre, ControlMap, Curve, Failsafe, Knob, KnobCalibration, MapError, OnPage, Response, SurfaceSettings,
     Takeover, TreePages,
 };
+use sinew_runtime::Basis;
 
 use crate::basis::SINEW_NONE;
 use crate::fault::Fault;
 use crate::memory::Regions;
+use crate::number;
 use crate::structs::{Elements, GrowingElement, GrowingStruct, choice};
 
 /// Knobs of a surface, at most.
@@ -96,16 +97,16 @@ pub struct SinewBinding {
     pub control: u32,
     /// Page on which it holds, from 0; `SINEW_NONE`: on all.
     pub page: u32,
-    /// A `SinewTakeover`.
-    pub takeover: i32,
+    /// What happens when the control stands elsewhere.
+    pub takeover: number::SinewTakeover,
     /// 0, or 1: clockwise lowers.
     pub inverted: u32,
-    /// A `SinewCurve`.
-    pub curve: i32,
+    /// Shape of the way.
+    pub curve: number::SinewCurve,
     /// Of the curve; not looked at where it is linear.
     pub curve_number: f32,
-    /// A `SinewCentre`.
-    pub centre: i32,
+    /// Where rest stands.
+    pub centre: number::SinewCentre,
     /// Share of the travel, at most 0.5; looked at for `SINEW_CENTRE_REST` alone.
     pub detent: f32,
     /// Weight at the lower end; with `maximum`, 0 and 0: the control's own stops. Never wider than those.
@@ -122,12 +123,12 @@ unsafe impl GrowingElement for SinewBinding {
     const FIRST_BYTES: usize = size_of::<Self>();
 }
 
-/// Which knobs there are, what they move, and what happens when the device does not behave. Start from zeros, set
-/// `struct_bytes` and `knob_count`: the knobs then follow the tree of components.
+/// Which knobs there are, what they move, and what happens when the device does not behave. With `knob_count` alone the knobs
+/// follow the tree of components.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct SinewSurfaceSettings {
-    /// `sizeof(SinewSurfaceSettings)`.
+    /// Set by `SINEW_INIT`.
     pub struct_bytes: usize,
     /// Knobs of the device, 1 to `SINEW_KNOBS_MAX`.
     pub knob_count: usize,
@@ -148,12 +149,12 @@ pub struct SinewSurfaceSettings {
     pub tree_coarse: u32,
     /// Knobs behind those for the children of the coarse knob last turned.
     pub tree_fine: u32,
-    /// A `SinewTakeover`, of the knobs that follow the tree.
-    pub tree_takeover: i32,
+    /// Of the knobs that follow the tree.
+    pub tree_takeover: number::SinewTakeover,
     /// 0: a turn of a coarse knob brings its children; 1: only `SINEW_COMMAND_FOCUS` does.
     pub tree_stays: u32,
-    /// Whether to correct readings for a supply that sags, 0 or 1: for potentiometers on a weak rail.
-    pub follow_supply: u32,
+    /// Whether a reading far from the last waits until a second confirms it, 0 or 1: for text lines, which have no checksum.
+    pub spike_guard: u32,
     /// How long the pose of a device that is gone is held before it eases to rest, microseconds; 0: 5 seconds,
     /// `UINT64_MAX`: for ever.
     pub hold_us: u64,
@@ -280,7 +281,7 @@ impl SinewSurfaceSettings {
         };
         SurfaceSettings {
             failsafe,
-            follow_supply: self.follow_supply != 0,
+            spike_guard: self.spike_guard != 0,
         }
     }
 }

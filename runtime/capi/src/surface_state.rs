@@ -1,7 +1,7 @@
 //! What a surface shows and what it can be asked for: takeover of each knob, health of the device, commands.
 
+use sinew_knobs::{Assignment, Command, ControlMap, ControlSurface, Direction, TakeoverState};
 use sinew_runtime::ControlError;
-use sinew_runtime::input::{Assignment, Command, ControlMap, ControlSurface, Direction, TakeoverState};
 
 use crate::basis::SINEW_NONE;
 use crate::fault::Fault;
@@ -49,11 +49,11 @@ pub enum SinewTakeoverState {
     TurnRight = 5,
 }
 
-/// One knob as a display shows it. Set `struct_bytes` to `sizeof(SinewKnobState)` before the call.
+/// One knob as a display shows it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct SinewKnobState {
-    /// `sizeof(SinewKnobState)`.
+    /// Set by `SINEW_INIT`.
     pub struct_bytes: usize,
     /// Where it stands with its control: of several the first that is not engaged.
     pub state: SinewTakeoverState,
@@ -71,11 +71,11 @@ unsafe impl GrowingStruct for SinewKnobState {
     const FIRST_BYTES: usize = size_of::<Self>();
 }
 
-/// How a surface and its device are doing. Set `struct_bytes` to `sizeof(SinewSurfaceStatus)` before the call.
+/// How a surface and its device are doing.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct SinewSurfaceStatus {
-    /// `sizeof(SinewSurfaceStatus)`.
+    /// Set by `SINEW_INIT`.
     pub struct_bytes: usize,
     /// Readings taken.
     pub readings: u64,
@@ -101,8 +101,8 @@ pub struct SinewSurfaceStatus {
     pub tree_parent: u32,
     /// Tree: the control whose children are on the fine knobs; `SINEW_NONE`: none are.
     pub tree_focus: u32,
-    /// Supply over supply at the start; 1 unless it is followed.
-    pub supply: f32,
+    /// Readings that the spike guard threw away.
+    pub spikes: u32,
 }
 
 // SAFETY: `repr(C)`, the size first. It is only written, never read.
@@ -156,7 +156,7 @@ impl SinewSurfaceStatus {
             page_count: surface.map().page_count().into(),
             tree_parent: shown(view.parent),
             tree_focus: shown(view.focus),
-            supply: status.supply,
+            spikes: status.spikes.min(u32::MAX.into()) as u32,
         }
     }
 }

@@ -7,11 +7,15 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::{Output, compact_package, compile, crate_folder, libraries, other_package, package, run, tool};
-use sinew_runtime::input::{
-    ControlMap, ControlSurface, Decoder, Knob, KnobState, Settings, SlotState, SurfaceSettings, TreePages,
+use common::{
+    Output, compact_package, compile, crate_folder, headers, libraries, other_package, package, renamed_package, run,
+    tool,
 };
-use sinew_runtime::{Basis, Controls, Frame, Workspace, WorkspaceLayout};
+use sinew_knobs::{
+    ControlMap, ControlSurface, Decoder, DecoderSettings, Knob, KnobState, SlotState, SurfaceMemory, SurfaceSettings,
+    TreePages,
+};
+use sinew_runtime::{Basis, Controls, Frame, Kernels, TierChoice, Workspace, WorkspaceLayout};
 use tempfile::TempDir;
 
 /// What valgrind ends with when it found anything.
@@ -29,6 +33,7 @@ impl Folder {
             ("baked.sinew", package()),
             ("other.sinew", other_package()),
             ("compact.sinew", compact_package()),
+            ("plain.sinew", renamed_package()),
         ] {
             fs::write(folder.path().join(name), &*bytes).expect("written");
         }
@@ -174,8 +179,13 @@ fn expected_play(bytes: &[u8]) -> (Vec<[f32; 3]>, Vec<f32>) {
     };
     let map = ControlMap::new(basis, &knobs, &[], &[], Some(tree)).expect("a map");
     let (mut states, mut slots) = ([KnobState::default(); 4], [SlotState::default(); 4]);
-    let mut surface = ControlSurface::new(map, SurfaceSettings::default(), &mut states, &mut slots).expect("room");
-    let mut decoder = Decoder::new(None, Settings::default());
+    let memory = SurfaceMemory {
+        knobs: &mut states,
+        slots: &mut slots,
+        left: &mut vec![0.0; basis.component_count()],
+    };
+    let mut surface = ControlSurface::new(map, SurfaceSettings::default(), memory).expect("room");
+    let mut decoder = Decoder::new(None, DecoderSettings::default());
     let mut weights = vec![0.0; basis.component_count()];
     let mut controls = Controls::new(&basis, &mut weights).expect("one weight a component");
     let mut now_us = 0;
@@ -225,6 +235,57 @@ fn the_knob_example_plays_what_the_box_says() {
     assert_eq!(knobs[2], "knob 2  moves nothing", "c00 has one child");
 }
 
+/// What the runtime plays for an instance of the crowd, in the round that is written. Shape: `[V]`.
+fn expected_instance(bytes: &[u8], instance: usize) -> Vec<[f32; 3]> {
+    const LAST_ROUND: usize = 2;
+    let basis = Basis::open(bytes).expect("valid");
+    let tier = match basis.bones() {
+        Some(_) => TierChoice::Bones,
+        None => TierChoice::Exact,
+    };
+    let layout = WorkspaceLayout::for_tier(&basis, tier).expect("it has it");
+    let mut memory = vec![0; layout.unaligned_bytes()];
+    let mut workspace = Workspace::for_tier(&basis, tier, &mut memory, Kernels::detect()).expect("enough");
+    let mut weights = vec![0.0; basis.component_count()];
+    let mut controls = Controls::new(&basis, &mut weights).expect("one weight a component");
+    for k in 0..basis.component_count() {
+        let share = ((3 * instance + 5 * k + 7 * LAST_ROUND) % 11) as f32 / 10.0;
+        controls.set(k, share * basis.component(k).maximum).expect("finite");
+    }
+    let mut positions = vec![[0.0; 3]; basis.vertex_count()];
+    let job = Frame {
+        basis: &basis,
+        controls: &controls,
+        positions: &mut positions,
+        normals: None,
+    };
+    job.run(&mut workspace).expect("finite");
+    positions
+}
+
+#[test]
+fn the_crowd_example_plays_every_instance_on_threads() {
+    let folder = Folder::new();
+    let obj = folder.file("crowd.obj");
+    let program = folder.program("examples/crowd.c", &libraries().shared);
+    for (name, bytes) in [("baked.sinew", package()), ("plain.sinew", renamed_package())] {
+        let output = run_twice(&program, &[folder.file(name), obj.clone(), "13".into(), "3".into()]);
+        assert_eq!(output.code, Some(0), "{}", output.stderr);
+        let played: Vec<&str> = output.stdout.lines().collect();
+        assert_eq!(
+            played,
+            [0, 1, 2].map(|round| format!("round {round}: 13 instances played"))
+        );
+        let written = fs::read_to_string(&obj).expect("the example wrote it");
+        let expected: Vec<[f32; 3]> = (0..13).flat_map(|n| expected_instance(&bytes, n)).collect();
+        assert_eq!(
+            vectors(&written, "v"),
+            expected,
+            "the runtime's own positions, to the bit"
+        );
+    }
+}
+
 /// Programs of wrong uses, each with its expected lines beside it.
 const MISUSES: [&str; 3] = ["misuse", "misuse_frames", "misuse_knobs"];
 
@@ -247,12 +308,12 @@ fn check_misuse(name: &str) {
 }
 
 #[test]
-fn every_misuse_of_packages_and_frames_is_refused_by_name_and_changes_nothing() {
+fn every_misuse_of_packages_players_and_frames_is_refused_by_name_and_changes_nothing() {
     check_misuse("misuse");
 }
 
 #[test]
-fn every_misuse_of_tiers_buffers_handles_and_batches_is_refused_by_name_and_changes_nothing() {
+fn every_misuse_of_tiers_buffers_pins_and_batches_is_refused_by_name_and_changes_nothing() {
     check_misuse("misuse_frames");
 }
 
@@ -261,20 +322,20 @@ fn every_misuse_of_decoders_and_surfaces_is_refused_by_name_and_changes_nothing(
     check_misuse("misuse_knobs");
 }
 
-/// What no single-threaded C program can bring about, or only with a resealed package.
+/// What no single-threaded C program can bring about.
 const NOT_IN_MISUSE: [&str; 2] = ["SINEW_STATUS_IN_USE", "SINEW_STATUS_INTERNAL"];
 
 #[test]
-fn the_misuses_show_every_status_that_is_not_of_a_package() {
+fn the_misuses_show_every_status() {
     let shown = MISUSES.map(|name| {
         fs::read_to_string(crate_folder().join(format!("tests/{name}.txt"))).expect("the expected lines are there")
     });
-    let header = fs::read_to_string(crate_folder().join("include/sinew.h")).expect("the header is there");
-    let statuses = header
+    let headers = headers();
+    let statuses = headers
         .lines()
         .filter_map(|line| line.trim().split_once(" = "))
         .map(|(name, _)| name)
-        .filter(|name| name.starts_with("SINEW_STATUS_") && !name.contains("_PACKAGE_"));
+        .filter(|name| name.starts_with("SINEW_STATUS_"));
     let mut count = 0;
     for status in statuses.filter(|name| !NOT_IN_MISUSE.contains(name)) {
         count += 1;

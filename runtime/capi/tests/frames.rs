@@ -1,10 +1,12 @@
-//! What engines want beyond a frame, through the C functions: the fast tier, held vertices, vertex buffers, batches. Each
-//! beside the runtime's own.
+//! What engines want beyond a frame, through the C functions: players, bones, pins, vertex buffers, batches, another
+//! package. Each beside the runtime's own.
 
 mod common;
 
-use common::player::{Held, Player, Round, Vertices, sized};
-use common::{other_package, package};
+use core::ptr::null_mut;
+
+use common::player::{Block, Pins, Player, Round, Vertices, sized};
+use common::{other_package, package, renamed_package};
 use sinew::*;
 use sinew_runtime::{
     Attribute, Basis, Controls, Frame, Kernels, TierChoice, VertexLayout, VertexOutput, Workspace, WorkspaceLayout,
@@ -23,7 +25,7 @@ fn pose(player: &Player, instance: usize, frame: usize) {
                 player.controls,
                 control,
                 weight(instance, control as usize, frame),
-                core::ptr::null_mut(),
+                null_mut(),
             )
         };
         assert_eq!(status, SinewStatus::Ok);
@@ -58,7 +60,7 @@ fn both_tiers_play_the_runtime_s_frames() {
     let package = package();
     for (tier, own) in [
         (SinewTier::Exact, TierChoice::Exact),
-        (SinewTier::Fast, TierChoice::Fast),
+        (SinewTier::Bones, TierChoice::Bones),
     ] {
         let mut player = Player::of_tier(&package, tier).expect("valid");
         pose(&player, 1, 2);
@@ -69,47 +71,11 @@ fn both_tiers_play_the_runtime_s_frames() {
     }
     let basis = Basis::open(&package).expect("valid");
     let info = Player::new(&package).expect("valid").info;
-    assert_eq!(
-        info.fast_node_count as usize,
-        basis.fast_node_count().expect("a fast tier")
-    );
-    assert_eq!(info.fast_error_max, basis.fast_error().expect("a fast tier").mixed_max);
+    assert_eq!(info.bone_count as usize, basis.bones().expect("bones").count());
+    assert_eq!(info.bone_error_max, basis.bones().expect("bones").error().sliders.max);
     let info = Player::new(&other_package()).expect("valid").info;
-    assert_eq!((info.fast_node_count, info.has_texture), (0, 0));
+    assert_eq!((info.bone_count, info.has_texture), (0, 0));
     assert_eq!(info.render_vertex_count, info.vertex_count);
-}
-
-#[test]
-fn programs_of_the_first_header_are_served() {
-    let package = package();
-    let player = Player::new(&package).expect("valid");
-    // What the struct had then.
-    let mut info = sized::<SinewBasisInfo>();
-    // SAFETY: the struct is longer than it says.
-    unsafe {
-        let out = info.as_mut_ptr();
-        (*out).struct_bytes = core::mem::offset_of!(SinewBasisInfo, fast_node_count);
-        assert_eq!(sinew_basis_info(player.basis, out), SinewStatus::Ok);
-        assert_eq!(
-            ((*out).vertex_count, (*out).fast_node_count),
-            (9, 0),
-            "nothing behind its end"
-        );
-        let mut report = sized::<SinewFrameReport>();
-        let out = report.as_mut_ptr();
-        (*out).struct_bytes = 16;
-        let mut player = player;
-        let options = player.options();
-        let status = sinew_frame(
-            player.basis,
-            player.workspace,
-            player.controls,
-            &options,
-            out,
-            core::ptr::null_mut(),
-        );
-        assert_eq!((status, (*out).maximum), (SinewStatus::Ok, [0.0; 3]));
-    }
 }
 
 #[test]
@@ -149,14 +115,147 @@ fn a_vertex_buffer_is_the_runtime_s() {
     assert_eq!(vertices.bytes, bytes);
     assert_eq!((bounds.minimum, bounds.maximum), (found.minimum, found.maximum));
 
-    let (mut indices, mut count) = (core::ptr::null(), 0);
-    // SAFETY: the player's memory stands, and the package.
-    let faces = unsafe {
-        let status = sinew_basis_render_faces(player.basis, &mut indices, &mut count);
+    let drawn = faces(&player, sinew_basis_render_faces, SinewWinding::CounterClockwise);
+    assert_eq!(drawn, basis.surface().drawn_faces().iter().collect::<Vec<_>>());
+}
+
+type Faces = unsafe extern "C" fn(*const SinewBasis, i32, *mut u32, usize) -> SinewStatus;
+
+fn faces(player: &Player, ask: Faces, winding: SinewWinding) -> Vec<[u32; 3]> {
+    let mut indices = vec![[u32::MAX; 3]; player.info.face_count as usize];
+    let flat = indices.as_flattened_mut();
+    // SAFETY: the player's memory stands.
+    let status = unsafe { ask(player.basis, winding as i32, flat.as_mut_ptr(), flat.len()) };
+    assert_eq!(status, SinewStatus::Ok);
+    indices
+}
+
+#[test]
+fn faces_are_the_basis_s_either_way_round() {
+    let package = package();
+    let basis = Basis::open(&package).expect("valid");
+    let player = Player::new(&package).expect("valid");
+    let own = faces(&player, sinew_basis_faces, SinewWinding::CounterClockwise);
+    assert_eq!(own, basis.faces().iter().collect::<Vec<_>>());
+    let turned = faces(&player, sinew_basis_faces, SinewWinding::Clockwise);
+    assert_eq!(turned, own.iter().map(|[a, b, c]| [*a, *c, *b]).collect::<Vec<_>>());
+}
+
+#[test]
+fn a_player_is_three_handles_in_one_block_that_play_the_same() {
+    let package = package();
+    for tier in [SinewTier::Exact, SinewTier::Bones] {
+        let mut separate = Player::of_tier(&package, tier).expect("valid");
+        pose(&separate, 1, 2);
+        separate.frame().expect("finite");
+        let block = Block::new(&package, tier, 192).expect("valid");
+        let player = block.player;
+        assert_eq!(
+            (player.vertex_count, player.control_count),
+            (separate.info.vertex_count, separate.control_count)
+        );
+        let mut positions = vec![f32::NAN; 3 * player.vertex_count as usize];
+        let mut options = separate.options();
+        (options.positions, options.normals) = (positions.as_mut_ptr(), null_mut());
+        for control in 0..player.control_count {
+            let weight = weight(1, control as usize, 2);
+            // SAFETY: the block stands.
+            let status = unsafe { sinew_control_set(player.controls, control, weight, null_mut()) };
+            assert_eq!(status, SinewStatus::Ok);
+        }
+        let SinewPlayer {
+            basis,
+            workspace,
+            controls,
+            ..
+        } = player;
+        // SAFETY: the block and the buffers stand.
+        let status = unsafe { sinew_frame(basis, workspace, controls, &options, null_mut(), null_mut()) };
+        assert_eq!((status, &positions), (SinewStatus::Ok, &separate.positions));
+        assert!(
+            block.tail().iter().all(|&byte| byte == 0xaa),
+            "beyond the layout nothing is written"
+        );
+        // SAFETY: the block stands.
+        unsafe {
+            assert_eq!(sinew_close(workspace.cast()), SinewStatus::Ok);
+            assert_eq!(
+                sinew_frame(basis, workspace, controls, &options, null_mut(), null_mut()),
+                SinewStatus::ClosedHandle
+            );
+            assert_eq!(sinew_controls_reset(controls), SinewStatus::Ok, "the others stand");
+        }
+    }
+    assert!(matches!(
+        Block::new(&other_package(), SinewTier::Bones, 0),
+        Err(SinewStatus::NoBones)
+    ));
+}
+
+#[test]
+fn weights_are_carried_by_name_into_another_package() {
+    let (package, other) = (package(), other_package());
+    let (from, to) = (
+        Player::new(&package).expect("valid"),
+        Player::new(&other).expect("valid"),
+    );
+    let mut carried = u32::MAX;
+    let mut weights = vec![f32::NAN; to.control_count as usize];
+    // SAFETY: the players' memory stands.
+    unsafe {
+        // Beyond its stop: the new control clamps.
+        assert_eq!(sinew_control_set_unclamped(from.controls, 0, 1e6), SinewStatus::Ok);
+        assert_eq!(sinew_control_set(from.controls, 1, -0.25, null_mut()), SinewStatus::Ok);
+        let status = sinew_controls_carry(from.basis, from.controls, to.basis, to.controls, &mut carried);
+        assert_eq!((status, carried), (SinewStatus::Ok, to.control_count));
+        let status = sinew_controls_get_all(to.controls, weights.as_mut_ptr(), weights.len());
         assert_eq!(status, SinewStatus::Ok);
-        core::slice::from_raw_parts(indices, count)
-    };
-    assert_eq!(faces, basis.render_mesh().faces.as_flattened());
+    }
+    let basis = Basis::open(&other).expect("valid");
+    assert_eq!(weights[..2], [basis.component(0).maximum, -0.25]);
+    assert!(weights[2..].iter().all(|&weight| weight == 0.0), "{weights:?}");
+}
+
+#[test]
+fn a_control_without_a_namesake_stays_and_the_order_does_not_matter() {
+    let package = package();
+    let turned = renamed_package();
+    let (from, to) = (
+        Player::new(&package).expect("valid"),
+        Player::new(&turned).expect("valid"),
+    );
+    let own = Basis::open(&turned).expect("valid");
+    let old = Basis::open(&package).expect("valid");
+    let mut carried = u32::MAX;
+    // SAFETY: the players' memory stands.
+    unsafe {
+        for k in 0..from.control_count {
+            assert_eq!(
+                sinew_control_set(from.controls, k, 0.1 + 0.1 * k as f32, null_mut()),
+                SinewStatus::Ok
+            );
+            assert_eq!(sinew_control_set(to.controls, k, -0.5, null_mut()), SinewStatus::Ok);
+        }
+        let status = sinew_controls_carry(from.basis, from.controls, to.basis, to.controls, &mut carried);
+        assert_eq!(status, SinewStatus::Ok);
+        let mut found = 0;
+        for k in 0..to.control_count {
+            let component = own.component(k as usize);
+            let (mut weight, mut expected) = (f32::NAN, -0.5);
+            if let Some(namesake) = old.component_named(component.name) {
+                assert_ne!(namesake, k as usize, "the order is another");
+                assert_eq!(
+                    sinew_control_get(from.controls, namesake as u32, &mut expected),
+                    SinewStatus::Ok
+                );
+                found += 1;
+            }
+            assert_eq!(sinew_control_get(to.controls, k, &mut weight), SinewStatus::Ok);
+            assert_eq!(weight, expected.clamp(component.minimum, component.maximum), "{k}");
+        }
+        assert_eq!(carried, found);
+        assert!(found > 0 && found < to.control_count);
+    }
 }
 
 #[test]
@@ -167,7 +266,7 @@ fn the_report_has_the_box() {
     let (options, mut report) = (player.options(), sized::<SinewFrameReport>());
     // SAFETY: the player's memory stands; the report is whole after a frame.
     let report = unsafe {
-        let (details, out) = (core::ptr::null_mut(), report.as_mut_ptr());
+        let (details, out) = (null_mut(), report.as_mut_ptr());
         let status = sinew_frame(player.basis, player.workspace, player.controls, &options, out, details);
         assert_eq!(status, SinewStatus::Ok);
         report.assume_init()
@@ -181,7 +280,7 @@ fn the_report_has_the_box() {
 }
 
 #[test]
-fn a_held_vertex_follows_and_a_pinned_control_stays() {
+fn a_pinned_vertex_follows_and_a_locked_control_stays() {
     let package = package();
     let mut player = Player::new(&package).expect("valid");
     let wanted = {
@@ -203,14 +302,14 @@ fn a_held_vertex_follows_and_a_pinned_control_stays() {
             .sqrt()
     };
     let before = distance(&player);
-    let held = Held::new(&player, 2);
-    assert_eq!(held.add(&player, 1), SinewStatus::Ok);
-    assert_eq!(held.aim(1, wanted), SinewStatus::Ok);
+    let pins = Pins::new(&player, 2);
+    assert_eq!(pins.add(&player, 1), SinewStatus::Ok);
+    assert_eq!(pins.aim(1, wanted), SinewStatus::Ok);
     // SAFETY: this memory stands.
-    assert_eq!(unsafe { sinew_handles_pin(held.handles, 1, 1) }, SinewStatus::Ok);
+    assert_eq!(unsafe { sinew_pins_lock(pins.pins, 1, 1) }, SinewStatus::Ok);
     let mut misfit = f32::INFINITY;
     for _ in 0..8 {
-        misfit = held.drag(&player).expect("in reach").misfit;
+        misfit = pins.drag(&player).expect("in reach").misfit;
     }
     player.frame().expect("finite");
     assert!(distance(&player) < 0.5 * before, "{} of {before}", distance(&player));
@@ -220,12 +319,12 @@ fn a_held_vertex_follows_and_a_pinned_control_stays() {
     unsafe {
         assert_eq!(sinew_control_get(player.controls, 1, &mut weight), SinewStatus::Ok);
         assert_eq!(weight, 0.0);
-        assert_eq!(sinew_handles_remove(held.handles, 1), SinewStatus::Ok);
+        assert_eq!(sinew_pins_remove(pins.pins, 1), SinewStatus::Ok);
     }
     assert_eq!(
-        held.drag(&player).map(|report| report.step_count),
+        pins.drag(&player).map(|report| report.step_count),
         Ok(0),
-        "nothing is held"
+        "nothing is pinned"
     );
 }
 
@@ -244,7 +343,7 @@ fn a_batch_plays_each_instance_once_with_the_same_bits() {
     let package = package();
     let tier = |n: usize| {
         if n.is_multiple_of(3) {
-            (SinewTier::Fast, TierChoice::Fast)
+            (SinewTier::Bones, TierChoice::Bones)
         } else {
             (SinewTier::Exact, TierChoice::Exact)
         }

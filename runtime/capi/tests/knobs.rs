@@ -11,7 +11,7 @@ use common::player::{Memory, Player, layout_bytes, sized};
 use rand::{Rng, SeedableRng, seq::IndexedRandom};
 use rand_chacha::ChaCha8Rng;
 use sinew::*;
-use sinew_runtime::input::{Decoder, KnobEvent, Protocol, Reading, Settings};
+use sinew_knobs::{Decoder, DecoderSettings, KnobEvent, Protocol, Reading};
 
 /// A decoder and its memory.
 struct Device {
@@ -44,9 +44,19 @@ impl Device {
     fn feed(&self, now_us: u64, bytes: &[u8]) -> usize {
         let mut taken = usize::MAX;
         // SAFETY: the device's memory stands.
-        let status = unsafe { sinew_decoder_feed(self.decoder, now_us, bytes.as_ptr(), bytes.len(), &mut taken) };
+        let status =
+            unsafe { sinew_decoder_feed(self.decoder, now_us, bytes.as_ptr().cast(), bytes.len(), &mut taken) };
         assert_eq!(status, SinewStatus::Ok);
         taken
+    }
+
+    fn greeting(&self, now_us: u64) -> Vec<u8> {
+        let (mut bytes, mut length) = ([0xaa_u8; SINEW_GREETING_BYTES], usize::MAX);
+        let (at, room) = (bytes.as_mut_ptr().cast(), bytes.len());
+        // SAFETY: the device's memory stands.
+        let status = unsafe { sinew_decoder_greeting(self.decoder, now_us, at, room, &mut length) };
+        assert_eq!(status, SinewStatus::Ok);
+        bytes[..length].to_vec()
     }
 
     fn next(&self) -> Option<SinewReading> {
@@ -131,7 +141,7 @@ fn readings_are_those_of_the_core_in_any_chunking() {
         let number: usize = rng.random_range(0..=5);
         let protocol = number.checked_sub(1).map(|index| Protocol::ALL[index]);
         let mut expected = Vec::new();
-        let mut core = Decoder::new(protocol, Settings::default());
+        let mut core = Decoder::new(protocol, DecoderSettings::default());
         core.feed(&bytes, &mut |event| expected.push(event));
         let device = Device::new(number as i32);
         let (mut found, mut fed) = (Vec::new(), 0);
@@ -216,22 +226,69 @@ fn counters_tell_what_happened() {
 }
 
 #[test]
-fn greetings_and_datagrams() {
+fn a_device_that_waits_for_a_greeting_gets_one_when_it_is_known() {
     for (protocol, expected) in [
         (SinewProtocol::Unknown, 0),
+        (SinewProtocol::Lines, 0),
         (SinewProtocol::Packets, 1),
         (SinewProtocol::Firmata, 37),
     ] {
         let device = Device::new(protocol as i32);
-        let (mut bytes, mut length) = ([0; 37], 0);
-        // SAFETY: the device's memory stands.
-        let status = unsafe { sinew_decoder_greeting(device.decoder, bytes.as_mut_ptr(), bytes.len(), &mut length) };
-        assert_eq!((status, length), (SinewStatus::Ok, expected), "{protocol:?}");
+        assert_eq!(device.greeting(0).len(), expected, "{protocol:?}");
+        assert_eq!(device.greeting(999_999).len(), 0, "{protocol:?}");
+        assert_eq!(
+            device.greeting(1_000_000).len(),
+            expected,
+            "{protocol:?}: it has not answered"
+        );
     }
+    // Nobody said what it speaks: it is greeted once its own words told, and no more when it reports.
+    let device = Device::new(SinewProtocol::Unknown as i32);
+    assert_eq!(device.greeting(0).len(), 0);
+    while device.info().protocol == SinewProtocol::Unknown {
+        device.feed(500_000, b"\xf9\x02\x05\xf0\x79\x02\x05x\0y\0\xf7");
+    }
+    assert_eq!(device.info().protocol, SinewProtocol::Firmata);
+    assert_eq!(device.greeting(600_000).len(), 37);
+    device.feed(700_000, b"\xe0\x10\x03");
+    assert_eq!(device.greeting(2_000_000).len(), 0);
+    // SAFETY: the device's memory stands.
+    assert_eq!(unsafe { sinew_decoder_replugged(device.decoder) }, SinewStatus::Ok);
+    assert_eq!(device.greeting(2_000_001).len(), 37);
+}
+
+#[test]
+fn a_reading_tells_when_its_bytes_came() {
+    let device = Device::new(SinewProtocol::Lines as i32);
+    device.feed(1_000, b"1|2\n3|");
+    device.feed(2_000, b"4\n");
+    let times: Vec<u64> = core::iter::from_fn(|| device.next())
+        .map(|reading| reading.time_us)
+        .collect();
+    assert_eq!(times, [2_000, 2_000], "the first line may have been cut");
+}
+
+#[test]
+fn nothing_may_be_no_pointer() {
+    let device = Device::new(SinewProtocol::Unknown as i32);
+    let mut taken = usize::MAX;
+    // SAFETY: the device's memory stands.
+    unsafe {
+        assert_eq!(
+            sinew_decoder_feed(device.decoder, 0, null(), 0, &mut taken),
+            SinewStatus::Ok
+        );
+        assert_eq!(taken, 0);
+        assert_eq!(sinew_decoder_feed_packet(device.decoder, 0, null(), 0), SinewStatus::Ok);
+    }
+}
+
+#[test]
+fn a_datagram_makes_readings() {
     let device = Device::new(SinewProtocol::Unknown as i32);
     let packet = b"/jaw\0\0\0\0,f\0\0\x3f\0\0\0";
     // SAFETY: the device's memory stands.
-    let status = unsafe { sinew_decoder_feed_packet(device.decoder, 7, packet.as_ptr(), packet.len()) };
+    let status = unsafe { sinew_decoder_feed_packet(device.decoder, 7, packet.as_ptr().cast(), packet.len()) };
     assert_eq!((status, device.info().protocol), (SinewStatus::Ok, SinewProtocol::Osc));
     let reading = device.next().expect("one number");
     assert!((reading.value as f32 / reading.full_scale as f32 - 0.5).abs() < 0.01);
@@ -275,7 +332,7 @@ impl Stage {
             tree_fine: 0,
             tree_takeover: 0,
             tree_stays: 0,
-            follow_supply: 0,
+            spike_guard: 0,
             hold_us: 200_000,
             ease_us: 100_000,
             silence_us: 0,
@@ -301,13 +358,14 @@ impl Stage {
     fn turn(&mut self, knob: u32, value: i32) {
         let reading = SinewReading {
             struct_bytes: size_of::<SinewReading>(),
+            time_us: self.now_us,
             kind: SinewReadingKind::Position as i32,
             knob,
             value,
             full_scale: 1023,
         };
         // SAFETY: the stage's memory stands.
-        let status = unsafe { sinew_surface_take(self.surface, self.now_us, &reading) };
+        let status = unsafe { sinew_surface_read(self.surface, &reading) };
         assert_eq!(status, SinewStatus::Ok);
     }
 

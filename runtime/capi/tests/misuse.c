@@ -55,6 +55,7 @@ static void opening(void)
     say_details("open no bytes", open_bytes(bytes, 0, &details));
     say_details("open a header only", open_bytes(bytes, 63, &details));
     say_numbers("open a truncated package", open_bytes(bytes, length - 1, &details), length, length - 1);
+    say_reason("open a truncated package", open_bytes(bytes, length - 1, &details));
     say_numbers("open a package and a byte", open_bytes(bytes, length + 1, &details), length, length + 1);
     memcpy(block.scratch + 4096 + 1, bytes, length);
     remember();
@@ -64,15 +65,15 @@ static void opening(void)
     kept = bytes[0];
     bytes[0] = 'x';
     remember();
-    say("open something else", open_bytes(bytes, length, NULL));
+    say_reason("open something else", open_bytes(bytes, length, &details));
     bytes[0] = kept;
     bytes[20] ^= 1;
     remember();
-    say("open a package with a damaged header", open_bytes(bytes, length, NULL));
+    say_reason("open a package with a damaged header", open_bytes(bytes, length, &details));
     bytes[20] ^= 1;
     bytes[length / 2] ^= 1;
     remember();
-    say("open a damaged package", open_bytes(bytes, length, NULL));
+    say_reason("open a damaged package", open_bytes(bytes, length, &details));
     bytes[length / 2] ^= 1;
     remember();
     say("open the package", open_bytes(bytes, length, NULL));
@@ -84,18 +85,18 @@ static void creating(void)
     SinewControls **controls_out = (SinewControls **)(void *)block.outs;
     uint8_t *memory = block.scratch;
     size_t size = workspace_layout.size_bytes;
-    say("workspace layout of NULL", sinew_workspace_layout(NULL, (SinewLayout *)(void *)block.outs));
-    say("workspace layout to NULL", sinew_workspace_layout(basis, NULL));
-    say("workspace layout into the package", sinew_workspace_layout(basis, (SinewLayout *)(void *)block.package));
-    say("workspace layout into the basis", sinew_workspace_layout(basis, (SinewLayout *)(void *)block.basis));
-    say("workspace of NULL", sinew_workspace_create(NULL, memory, size, out, NULL));
-    say("workspace in NULL memory", sinew_workspace_create(basis, NULL, size, out, NULL));
-    say("workspace with a NULL result", sinew_workspace_create(basis, memory, size, NULL, NULL));
-    say("workspace in misaligned memory", sinew_workspace_create(basis, memory + 4, BLOCK_BYTES, out, NULL));
-    say("workspace in short memory", sinew_workspace_create(basis, memory, size - 1, out, &details));
-    say("workspace in the package", sinew_workspace_create(basis, block.package, BLOCK_BYTES, out, NULL));
-    say("workspace over the basis", sinew_workspace_create(basis, block.basis, BLOCK_BYTES, out, NULL));
-    say("workspace of a workspace", sinew_workspace_create((SinewBasis *)(void *)workspace, memory, size, out, NULL));
+    say("workspace layout of NULL", sinew_workspace_layout(NULL, NULL, (SinewLayout *)(void *)block.outs));
+    say("workspace layout to NULL", sinew_workspace_layout(basis, NULL, NULL));
+    say("workspace layout into the package", sinew_workspace_layout(basis, NULL, (SinewLayout *)(void *)block.package));
+    say("workspace layout into the basis", sinew_workspace_layout(basis, NULL, (SinewLayout *)(void *)block.basis));
+    say("workspace of NULL", sinew_workspace_create(NULL, NULL, memory, size, out, NULL));
+    say("workspace in NULL memory", sinew_workspace_create(basis, NULL, NULL, size, out, NULL));
+    say("workspace with a NULL result", sinew_workspace_create(basis, NULL, memory, size, NULL, NULL));
+    say("workspace in misaligned memory", sinew_workspace_create(basis, NULL, memory + 4, BLOCK_BYTES, out, NULL));
+    say("workspace in short memory", sinew_workspace_create(basis, NULL, memory, size - 1, out, &details));
+    say("workspace in the package", sinew_workspace_create(basis, NULL, block.package, BLOCK_BYTES, out, NULL));
+    say("workspace over the basis", sinew_workspace_create(basis, NULL, block.basis, BLOCK_BYTES, out, NULL));
+    say("workspace of a workspace", sinew_workspace_create((SinewBasis *)(void *)workspace, NULL, memory, size, out, NULL));
     size = controls_layout.size_bytes;
     say("controls layout to NULL", sinew_controls_layout(basis, NULL));
     say("controls in short memory", sinew_controls_create(basis, memory, size - 1, controls_out, NULL));
@@ -116,8 +117,10 @@ static void asking(void)
     say("info with a wrong size", sinew_basis_info(basis, asked));
     say("info to NULL", sinew_basis_info(basis, NULL));
     say("info of NULL", sinew_basis_info(NULL, asked));
-    say("faces to NULL", sinew_basis_faces(basis, NULL, (size_t *)(void *)block.outs));
-    say("faces without count", sinew_basis_faces(basis, (const uint32_t **)(void *)block.outs, NULL));
+    say("faces to NULL", sinew_basis_faces(basis, 0, NULL, 3 * (size_t)info.face_count));
+    say("faces to a short buffer", sinew_basis_faces(basis, 0, (uint32_t *)(void *)block.outs, 3 * (size_t)info.face_count - 1));
+    say("faces into the package", sinew_basis_faces(basis, 0, (uint32_t *)(void *)block.package, BLOCK_BYTES / 4));
+    say("faces in an unknown winding", sinew_basis_faces(basis, -1, (uint32_t *)(void *)block.outs, BLOCK_BYTES / 4));
     say("name beyond the last", sinew_control_name(basis, count, name, sizeof name));
     say("name to NULL", sinew_control_name(basis, 0, NULL, 65));
     say("name to a short buffer", sinew_control_name(basis, 0, name, 1));
@@ -169,18 +172,72 @@ static void setting(void)
     say("get all into the controls", sinew_controls_get_all(controls, (float *)(void *)(block.controls + 64), count));
     say("get all of impossible length", sinew_controls_get_all(controls, out, SIZE_MAX));
     say("reset NULL", sinew_controls_reset(NULL));
+    say("carry from NULL", sinew_controls_carry(basis, NULL, other_basis, other_controls, NULL));
+    say("carry to NULL", sinew_controls_carry(basis, controls, other_basis, NULL, NULL));
+    say("carry from no basis", sinew_controls_carry(NULL, controls, other_basis, other_controls, NULL));
+    say("carry from another basis's controls", sinew_controls_carry(basis, other_controls, other_basis, controls, NULL));
+    say("carry to another basis's controls", sinew_controls_carry(other_basis, other_controls, other_basis, controls, NULL));
+    say("carry to the same controls", sinew_controls_carry(basis, controls, basis, controls, NULL));
+    say("carry with the count in the controls",
+        sinew_controls_carry(basis, controls, other_basis, other_controls, (uint32_t *)(void *)(block.controls + 64)));
 }
 
 static SinewFrameOptions frame_options(void)
 {
-    SinewFrameOptions options;
-    memset(&options, 0, sizeof options);
-    options.struct_bytes = sizeof options;
+    SinewFrameOptions options = SINEW_INIT(SinewFrameOptions);
     options.positions = (float *)(void *)block.positions;
     options.position_floats = floats;
     options.normals = (float *)(void *)block.normals;
     options.normal_floats = floats;
     return options;
+}
+
+static void players(void)
+{
+    SinewPlayer *player = (SinewPlayer *)(void *)block.structs;
+    SinewWorkspaceOptions options = SINEW_INIT(SinewWorkspaceOptions);
+    SinewFrameOptions frame = frame_options();
+    SinewLayout layout;
+    uint8_t *memory = block.scratch, *bytes = block.package;
+    size_t length = package_bytes, size;
+    must(sinew_player_layout(bytes, length, NULL, &layout, NULL));
+    size = layout.size_bytes;
+    player->struct_bytes = sizeof *player;
+    remember();
+    say("player layout to NULL", sinew_player_layout(bytes, length, NULL, NULL, NULL));
+    say("player layout of NULL bytes", sinew_player_layout(NULL, length, NULL, &layout, NULL));
+    say_details("player layout of no bytes", sinew_player_layout(NULL, 0, NULL, &layout, &details));
+    say_details("player layout of a compact package",
+                sinew_player_layout(block.compact, compact_bytes, NULL, &layout, &details));
+    say("player layout into the package", sinew_player_layout(bytes, length, NULL, (SinewLayout *)(void *)bytes, NULL));
+    options.tier = SINEW_TIER_BONES;
+    say_details("player layout of a tier that is not there",
+                sinew_player_layout(block.other, other_bytes, &options, &layout, &details));
+    options.tier = 77;
+    say_details("player of an unknown tier", sinew_player_open(SINEW_ABI_VERSION, bytes, length, &options, memory, size,
+                                                               player, &details));
+    say_details("player with the header of another version",
+                sinew_player_open(SINEW_ABI_VERSION + 1, bytes, length, NULL, memory, size, player, &details));
+    say("player to NULL", sinew_player_open(SINEW_ABI_VERSION, bytes, length, NULL, memory, size, NULL, NULL));
+    say("player in NULL memory", sinew_player_open(SINEW_ABI_VERSION, bytes, length, NULL, NULL, size, player, NULL));
+    say("player in misaligned memory",
+        sinew_player_open(SINEW_ABI_VERSION, bytes, length, NULL, memory + 16, BLOCK_BYTES - 16, player, NULL));
+    say_numbers("player in short memory",
+                sinew_player_open(SINEW_ABI_VERSION, bytes, length, NULL, memory, size - 1, player, &details), size,
+                size - 1);
+    say("player in the package", sinew_player_open(SINEW_ABI_VERSION, bytes, length, NULL, bytes, size, player, NULL));
+    say("player in its own struct",
+        sinew_player_open(SINEW_ABI_VERSION, bytes, length, NULL, block.structs, BLOCK_BYTES, player, NULL));
+    player->struct_bytes = 1;
+    remember();
+    say("player of a wrong size", sinew_player_open(SINEW_ABI_VERSION, bytes, length, NULL, memory, size, player, NULL));
+    player->struct_bytes = sizeof *player;
+    must(sinew_player_open(SINEW_ABI_VERSION, bytes, length, NULL, memory, size, player, NULL));
+    remember();
+    say("player", SINEW_STATUS_OK);
+    say("set a control beyond the player's last", sinew_control_set(player->controls, player->control_count, 0.0f, NULL));
+    say("a player's workspace with other controls",
+        sinew_frame(player->basis, player->workspace, other_controls, &frame, NULL, NULL));
 }
 
 static void playing_with_handles(void)
@@ -327,16 +384,19 @@ static void closing(void)
 {
     SinewFrameOptions options = frame_options();
     remember();
-    say("close NULL", sinew_workspace_close(NULL));
-    say("close the wrong kind", sinew_workspace_close((SinewWorkspace *)(void *)controls));
-    must(sinew_workspace_close(workspace));
+    say("close NULL", sinew_close(NULL));
+    say("close a handle of which only a copy is there",
+        (memcpy(block.scratch, block.controls, controls_layout.size_bytes), remember(), sinew_close(block.scratch)));
+    say("close what is no handle", sinew_close(block.positions));
+    say("close a misaligned handle", sinew_close(block.workspace + 1));
+    must(sinew_close(workspace));
     remember();
-    say("close twice", sinew_workspace_close(workspace));
+    say("close twice", sinew_close(workspace));
     say_details("frame with a closed workspace", sinew_frame(basis, workspace, controls, &options, NULL, &details));
-    must(sinew_controls_close(controls));
+    must(sinew_close(controls));
     remember();
     say("set closed controls", sinew_control_set(controls, 0, 0.0f, NULL));
-    must(sinew_basis_close(basis));
+    must(sinew_close(basis));
     remember();
     say("ask a closed basis", sinew_control_range(basis, 0, NULL, NULL));
     memset(block.other_basis, 0, BLOCK_BYTES);
@@ -353,6 +413,7 @@ int main(int argc, char **argv)
     creating();
     asking();
     setting();
+    players();
     playing_with_handles();
     playing_with_buffers();
     playing_with_numbers();

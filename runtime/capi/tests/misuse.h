@@ -12,10 +12,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "sinew.h"
+#include "sinew_batch.h"
+#include "sinew_bones.h"
+#include "sinew_knobs.h"
+#include "sinew_pins.h"
 
 /* All memory of the program is one arena, so that one copy of it shows what a refused call changed. */
-enum { BLOCK_COUNT = 16, BLOCK_BYTES = 1 << 15, ARENA_BYTES = BLOCK_COUNT * BLOCK_BYTES };
+enum { BLOCK_COUNT = 16, BLOCK_BYTES = 1 << 16, ARENA_BYTES = BLOCK_COUNT * BLOCK_BYTES };
 static uint8_t *arena, *before;
 static void *allocated;
 
@@ -61,8 +64,19 @@ static inline void say_details(const char *what, SinewStatus status)
         printf("details of another status\n");
         changed_count++;
     }
-    printf("  %s | index %lu, expected %lu, actual %lu\n", details.text, (unsigned long)details.index,
+    printf("  %s | index %lu, expected %lu, actual %lu", details.text, (unsigned long)details.index,
            (unsigned long)details.expected, (unsigned long)details.actual);
+    if (details.reason != SINEW_PACKAGE_REASON_NONE) {
+        printf(", reason %ld", (long)details.reason);
+    }
+    printf("\n");
+    say(what, status);
+}
+
+/* As say_details, where the sentence is not for a text that stays. */
+static inline void say_reason(const char *what, SinewStatus status)
+{
+    printf("  reason %ld\n", (long)details.reason);
     say(what, status);
 }
 
@@ -120,10 +134,10 @@ static inline void prepare(int argc, char **argv)
                           NULL));
     must(sinew_basis_open(SINEW_ABI_VERSION, block.other, other_bytes, block.other_basis, BLOCK_BYTES, &other_basis,
                           NULL));
-    must(sinew_workspace_layout(basis, &workspace_layout));
+    must(sinew_workspace_layout(basis, NULL, &workspace_layout));
     must(sinew_controls_layout(basis, &controls_layout));
-    must(sinew_workspace_create(basis, block.workspace, BLOCK_BYTES, &workspace, NULL));
-    must(sinew_workspace_create(other_basis, block.other_workspace, BLOCK_BYTES, &other_workspace, NULL));
+    must(sinew_workspace_create(basis, NULL, block.workspace, BLOCK_BYTES, &workspace, NULL));
+    must(sinew_workspace_create(other_basis, NULL, block.other_workspace, BLOCK_BYTES, &other_workspace, NULL));
     must(sinew_controls_create(basis, block.controls, BLOCK_BYTES, &controls, NULL));
     must(sinew_controls_create(other_basis, block.other_controls, BLOCK_BYTES, &other_controls, NULL));
     info.struct_bytes = sizeof info;

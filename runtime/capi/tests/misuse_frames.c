@@ -1,4 +1,4 @@
-/* Every wrong use of tiers, vertex buffers, held vertices and batches that the header names, one line each: what was done,
+/* Every wrong use of tiers, bones, vertex buffers, pins and batches that the header names, one line each: what was done,
  * and the status that came back.
  *
  *   misuse_frames baked.sinew other.sinew compact.sinew
@@ -7,42 +7,38 @@
  */
 #include "misuse.h"
 
-static SinewHandles *handles, *other_handles;
-static SinewWorkspace *fast;
-static SinewLayout handles_layout, fast_layout;
+static SinewPins *pins, *other_pins;
+static SinewWorkspace *bones;
+static SinewLayout pins_layout, bones_layout;
 
 static void tiers(void)
 {
     SinewWorkspace **out = (SinewWorkspace **)(void *)block.outs;
     SinewLayout *layout = (SinewLayout *)(void *)block.outs;
-    SinewWorkspaceOptions options;
+    SinewWorkspaceOptions options = SINEW_INIT(SinewWorkspaceOptions);
     uint8_t *memory = block.scratch;
-    memset(&options, 0, sizeof options);
-    options.struct_bytes = sizeof options;
-    options.tier = SINEW_TIER_FAST;
-    say("fast layout of a package without fast tier", sinew_workspace_layout_for(other_basis, &options, layout));
-    say_details("fast workspace of a package without fast tier",
-                sinew_workspace_create_for(other_basis, &options, memory, BLOCK_BYTES, out, &details));
-    say_numbers("fast workspace in short memory",
-                sinew_workspace_create_for(basis, &options, memory, fast_layout.size_bytes - 1, out, &details),
-                fast_layout.size_bytes, fast_layout.size_bytes - 1);
-    say("fast workspace in NULL memory", sinew_workspace_create_for(basis, &options, NULL, BLOCK_BYTES, out, NULL));
+    options.tier = SINEW_TIER_BONES;
+    say("bones layout of a package without bones", sinew_workspace_layout(other_basis, &options, layout));
+    say_details("bones workspace of a package without bones",
+                sinew_workspace_create(other_basis, &options, memory, BLOCK_BYTES, out, &details));
+    say_numbers("bones workspace in short memory",
+                sinew_workspace_create(basis, &options, memory, bones_layout.size_bytes - 1, out, &details),
+                bones_layout.size_bytes, bones_layout.size_bytes - 1);
+    say("bones workspace in NULL memory", sinew_workspace_create(basis, &options, NULL, BLOCK_BYTES, out, NULL));
     options.tier = 2;
     say_details("workspace of an unknown tier",
-                sinew_workspace_create_for(basis, &options, memory, BLOCK_BYTES, out, &details));
+                sinew_workspace_create(basis, &options, memory, BLOCK_BYTES, out, &details));
     options.tier = 0;
     options.kernels = 2;
     say_details("workspace on unknown kernels",
-                sinew_workspace_create_for(basis, &options, memory, BLOCK_BYTES, out, &details));
+                sinew_workspace_create(basis, &options, memory, BLOCK_BYTES, out, &details));
     options.struct_bytes = 1;
-    say("workspace with options of a wrong size", sinew_workspace_layout_for(basis, &options, layout));
+    say("workspace with options of a wrong size", sinew_workspace_layout(basis, &options, layout));
 }
 
 static SinewVertexOptions vertex_options(void)
 {
-    SinewVertexOptions options;
-    memset(&options, 0, sizeof options);
-    options.struct_bytes = sizeof options;
+    SinewVertexOptions options = SINEW_INIT(SinewVertexOptions);
     options.positions = (float *)(void *)block.positions;
     options.position_floats = floats;
     options.normals = (float *)(void *)block.normals;
@@ -103,7 +99,7 @@ static void vertices(void)
     options.normal_offset = SIZE_MAX;
     say("vertices with an offset beyond all memory", sinew_vertices_write(basis, &options, NULL, NULL));
     options = vertex_options();
-    options.encoding = 3;
+    options.encoding = 4;
     say_details("vertices in an unknown encoding", sinew_vertices_write(basis, &options, NULL, &details));
     options = vertex_options();
     say_details("texture of a package without", sinew_vertices_write(other_basis, &options, NULL, &details));
@@ -120,69 +116,100 @@ static void vertices(void)
     say("bounds to a misaligned place",
         sinew_vertices_write(basis, &options, (SinewBounds *)(void *)(block.outs + 1), NULL));
     say("vertices", sinew_vertices_write(basis, &options, (SinewBounds *)(void *)block.outs, NULL));
-    say("render faces to NULL", sinew_basis_render_faces(basis, NULL, (size_t *)(void *)block.outs));
-    say("render faces of NULL",
-        sinew_basis_render_faces(NULL, (const uint32_t **)(void *)block.outs, (size_t *)(void *)(block.outs + 64)));
+    say("render faces to NULL", sinew_basis_render_faces(basis, 0, NULL, 3 * (size_t)info.face_count));
+    say("render faces of NULL", sinew_basis_render_faces(NULL, 0, (uint32_t *)(void *)block.outs, BLOCK_BYTES / 4));
+    say("render faces in an unknown winding",
+        sinew_basis_render_faces(basis, 2, (uint32_t *)(void *)block.outs, BLOCK_BYTES / 4));
 }
 
-static void holding(void)
+static void pinning(void)
 {
-    SinewHandles **out = (SinewHandles **)(void *)block.outs;
+    SinewPins **out = (SinewPins **)(void *)block.outs;
     uint8_t *memory = block.scratch;
     float target[3] = {0.0f, 0.0f, 0.0f};
     uint32_t k;
-    say("handles layout to NULL", sinew_handles_layout(basis, 2, NULL));
-    say("handles layout of NULL", sinew_handles_layout(NULL, 2, (SinewLayout *)(void *)block.outs));
-    say("handles in NULL memory", sinew_handles_create(basis, 2, NULL, BLOCK_BYTES, out, NULL));
-    say("handles in misaligned memory", sinew_handles_create(basis, 2, memory + 16, BLOCK_BYTES, out, NULL));
-    say_numbers("handles in short memory",
-                sinew_handles_create(basis, 2, memory, handles_layout.size_bytes - 1, out, &details),
-                handles_layout.size_bytes, handles_layout.size_bytes - 1);
-    say("handles in the package", sinew_handles_create(basis, 2, block.package, BLOCK_BYTES, out, NULL));
-    say("hold with NULL", sinew_handles_add(basis, NULL, workspace, 0, NULL));
-    say("hold with controls for handles",
-        sinew_handles_add(basis, (SinewHandles *)(void *)controls, workspace, 0, NULL));
-    say_details("hold a vertex beyond the last", sinew_handles_add(basis, handles, workspace, info.vertex_count, &details));
-    say_details("hold with a fast workspace", sinew_handles_add(basis, handles, fast, 0, &details));
-    say_details("hold with another basis's workspace", sinew_handles_add(basis, handles, other_workspace, 0, &details));
-    say_details("hold with another basis's handles", sinew_handles_add(basis, other_handles, workspace, 0, &details));
-    must(sinew_handles_add(basis, handles, workspace, 1, NULL));
+    say("pins layout to NULL", sinew_pins_layout(basis, 2, NULL));
+    say("pins layout of NULL", sinew_pins_layout(NULL, 2, (SinewLayout *)(void *)block.outs));
+    say("pins in NULL memory", sinew_pins_create(basis, 2, NULL, BLOCK_BYTES, out, NULL));
+    say("pins in misaligned memory", sinew_pins_create(basis, 2, memory + 16, BLOCK_BYTES, out, NULL));
+    say_numbers("pins in short memory",
+                sinew_pins_create(basis, 2, memory, pins_layout.size_bytes - 1, out, &details),
+                pins_layout.size_bytes, pins_layout.size_bytes - 1);
+    say("pins in the package", sinew_pins_create(basis, 2, block.package, BLOCK_BYTES, out, NULL));
+    say("pin with NULL", sinew_pins_add(basis, NULL, workspace, 0, NULL));
+    say("pin with controls for pins",
+        sinew_pins_add(basis, (SinewPins *)(void *)controls, workspace, 0, NULL));
+    say_details("pin a vertex beyond the last", sinew_pins_add(basis, pins, workspace, info.vertex_count, &details));
+    say_details("pin with a workspace of bones", sinew_pins_add(basis, pins, bones, 0, &details));
+    say_details("pin with another basis's workspace", sinew_pins_add(basis, pins, other_workspace, 0, &details));
+    say_details("pin with another basis's pins", sinew_pins_add(basis, other_pins, workspace, 0, &details));
+    must(sinew_pins_add(basis, pins, workspace, 1, NULL));
     remember();
-    say_details("hold a vertex twice", sinew_handles_add(basis, handles, workspace, 1, &details));
-    must(sinew_handles_add(basis, handles, workspace, 3, NULL));
+    say_details("pin a vertex twice", sinew_pins_add(basis, pins, workspace, 1, &details));
+    must(sinew_pins_add(basis, pins, workspace, 3, NULL));
     remember();
-    say_details("hold more vertices than there is room for", sinew_handles_add(basis, handles, workspace, 4, &details));
-    say("target of a vertex that is not held", sinew_handles_target(handles, 4, target));
-    say("target from NULL", sinew_handles_target(handles, 1, NULL));
-    say("target from the handles", sinew_handles_target(handles, 1, (float *)(void *)(block.extra + 64)));
+    say_details("pin more vertices than there is room for", sinew_pins_add(basis, pins, workspace, 4, &details));
+    say("target of a vertex that is not pinned", sinew_pins_move(pins, 4, target));
+    say("target from NULL", sinew_pins_move(pins, 1, NULL));
+    say("target from the pins", sinew_pins_move(pins, 1, (float *)(void *)(block.extra + 64)));
     target[1] = NAN;
-    say("target that is no number", sinew_handles_target(handles, 1, target));
-    say("let go of a vertex that is not held", sinew_handles_remove(handles, 4));
-    say("let go with NULL", sinew_handles_clear(NULL));
-    say("pin a control beyond the last", sinew_handles_pin(handles, info.control_count, 1));
-    say("drag without basis", sinew_drag(NULL, handles, workspace, controls, NULL, NULL));
-    say("drag without handles", sinew_drag(basis, NULL, workspace, controls, NULL, NULL));
-    say("drag with a fast workspace", sinew_drag(basis, handles, fast, controls, NULL, NULL));
-    say("drag another basis's controls", sinew_drag(basis, handles, workspace, other_controls, NULL, NULL));
-    say("drag with another basis's handles", sinew_drag(basis, other_handles, workspace, controls, NULL, NULL));
+    say("target that is no number", sinew_pins_move(pins, 1, target));
+    say("let go of a vertex that is not pinned", sinew_pins_remove(pins, 4));
+    say("let go with NULL", sinew_pins_clear(NULL));
+    say("lock a control beyond the last", sinew_pins_lock(pins, info.control_count, 1));
+    say("drag without basis", sinew_pins_drag(NULL, pins, workspace, controls, NULL, NULL));
+    say("drag without pins", sinew_pins_drag(basis, NULL, workspace, controls, NULL, NULL));
+    say("drag with a workspace of bones", sinew_pins_drag(basis, pins, bones, controls, NULL, NULL));
+    say("drag another basis's controls", sinew_pins_drag(basis, pins, workspace, other_controls, NULL, NULL));
+    say("drag with another basis's pins", sinew_pins_drag(basis, other_pins, workspace, controls, NULL, NULL));
     ((SinewDragReport *)(void *)block.structs)->struct_bytes = 1;
     remember();
     say("drag with a report of a wrong size",
-        sinew_drag(basis, handles, workspace, controls, (SinewDragReport *)(void *)block.structs, NULL));
-    must(sinew_handles_add(other_basis, other_handles, other_workspace, 0, NULL));
+        sinew_pins_drag(basis, pins, workspace, controls, (SinewDragReport *)(void *)block.structs, NULL));
+    must(sinew_pins_add(other_basis, other_pins, other_workspace, 0, NULL));
     for (k = 0; k < info.control_count; k++) {
         must(sinew_control_set_unclamped(other_controls, k, FLT_MAX));
     }
     remember();
-    /* The handles forget what they knew of the pose; the controls stay. */
+    /* The pins forget what they knew of the pose; the controls stay. */
     printf("drag from weights that overflow: %s\n",
-           sinew_status_name(sinew_drag(other_basis, other_handles, other_workspace, other_controls, NULL, &details)));
+           sinew_status_name(sinew_pins_drag(other_basis, other_pins, other_workspace, other_controls, NULL, &details)));
     printf("  %s, controls %s\n", details.text,
            memcmp(before + (block.other_controls - arena), block.other_controls, BLOCK_BYTES) == 0 ? "stay" : "moved");
     must(sinew_controls_reset(other_controls));
-    must(sinew_handles_close(handles));
+    must(sinew_close(pins));
     remember();
-    say("drag with closed handles", sinew_drag(basis, handles, workspace, controls, NULL, NULL));
+    say("drag with closed pins", sinew_pins_drag(basis, pins, workspace, controls, NULL, NULL));
+}
+
+static void posing(void)
+{
+    float *maps = (float *)(void *)block.scratch;
+    uint16_t *weights = (uint16_t *)(void *)block.outs;
+    size_t room = 12 * (size_t)info.bone_count, count = (size_t)info.bone_influences * info.vertex_count;
+    say("bones of NULL", sinew_bones_pose(NULL, bones, controls, 0, maps, room, NULL));
+    say_details("bones of a package without bones",
+                sinew_bones_pose(other_basis, other_workspace, other_controls, 0, maps, room, &details));
+    say_details("bones with a workspace of the exact tier",
+                sinew_bones_pose(basis, workspace, controls, 0, maps, room, &details));
+    say("bones of another basis's controls", sinew_bones_pose(basis, bones, other_controls, 0, maps, room, NULL));
+    say_details("bones in an unknown form", sinew_bones_pose(basis, bones, controls, 3, maps, room, &details));
+    say("bones to NULL", sinew_bones_pose(basis, bones, controls, 0, NULL, room, NULL));
+    say_numbers("bones to a short buffer", sinew_bones_pose(basis, bones, controls, 1, maps, room - 1, &details), room,
+                room - 1);
+    say_numbers("joints to a short buffer",
+                sinew_bones_pose(basis, bones, controls, 2, maps, room - 2 * (size_t)info.bone_count - 1, &details),
+                room - 2 * (size_t)info.bone_count, room - 2 * (size_t)info.bone_count - 1);
+    say("bones into the workspace", sinew_bones_pose(basis, bones, controls, 0, (float *)(void *)bones, room, NULL));
+    say("rest of a package without bones", sinew_bones_rest(other_basis, maps, room, NULL));
+    say("rest to a short buffer", sinew_bones_rest(basis, maps, 10 * (size_t)info.bone_count - 1, NULL));
+    say("rest into the package", sinew_bones_rest(basis, (float *)(void *)block.package, room, NULL));
+    say("skin of a package without bones",
+        sinew_bones_skin(other_basis, block.scratch, count, weights, count, NULL));
+    say("skin with too few bones", sinew_bones_skin(basis, block.scratch, count - 1, weights, count, NULL));
+    say("skin with too few weights", sinew_bones_skin(basis, block.scratch, count, weights, count - 1, NULL));
+    say("skin with bones and weights in one place",
+        sinew_bones_skin(basis, block.outs, count, weights, count, NULL));
 }
 
 static SinewBatch **batch_out;
@@ -195,7 +222,7 @@ static SinewStatus make_batch(const SinewInstance *instances, size_t count)
 static void batches(void)
 {
     SinewInstance instances[2], good[2];
-    SinewInstanceReport report;
+    SinewInstanceReport report = SINEW_INIT(SinewInstanceReport);
     SinewLayout layout;
     SinewBatch *batch = NULL;
     size_t played = 7;
@@ -208,7 +235,7 @@ static void batches(void)
     instances[0].normals = (float *)(void *)block.normals;
     instances[0].normal_floats = floats;
     instances[1] = instances[0];
-    instances[1].workspace = fast;
+    instances[1].workspace = bones;
     instances[1].controls = other_controls;
     instances[1].positions = (float *)(void *)(block.positions + 4096);
     instances[1].normals = NULL;
@@ -260,7 +287,6 @@ static void batches(void)
     printf("the count stands at %lu\n", (unsigned long)played);
     say("play", sinew_batch_play(basis, batch, &played, NULL));
     printf("the count stands at %lu\n", (unsigned long)played);
-    report.struct_bytes = sizeof report;
     say("report of NULL", sinew_batch_report(NULL, 0, &report));
     say("report to NULL", sinew_batch_report(batch, 0, NULL));
     say("report of an instance beyond the last", sinew_batch_report(batch, 2, &report));
@@ -274,26 +300,25 @@ static void batches(void)
     say("play the next round", sinew_batch_play(basis, batch, &played, NULL));
     printf("the count stands at %lu\n", (unsigned long)played);
     say("begin NULL", sinew_batch_begin(NULL));
-    must(sinew_batch_close(batch));
+    must(sinew_close(batch));
     remember();
     say("play a closed batch", sinew_batch_play(basis, batch, &played, NULL));
 }
 
 int main(int argc, char **argv)
 {
-    SinewWorkspaceOptions options;
+    SinewWorkspaceOptions options = SINEW_INIT(SinewWorkspaceOptions);
     prepare(argc, argv);
-    memset(&options, 0, sizeof options);
-    options.struct_bytes = sizeof options;
-    options.tier = SINEW_TIER_FAST;
-    must(sinew_workspace_layout_for(basis, &options, &fast_layout));
-    must(sinew_workspace_create_for(basis, &options, block.outs + BLOCK_BYTES / 2, BLOCK_BYTES / 2, &fast, NULL));
-    must(sinew_handles_layout(basis, 2, &handles_layout));
-    must(sinew_handles_create(basis, 2, block.extra, BLOCK_BYTES, &handles, NULL));
-    must(sinew_handles_create(other_basis, 2, block.structs + BLOCK_BYTES / 2, BLOCK_BYTES / 2, &other_handles, NULL));
+    options.tier = SINEW_TIER_BONES;
+    must(sinew_workspace_layout(basis, &options, &bones_layout));
+    must(sinew_workspace_create(basis, &options, block.outs + BLOCK_BYTES / 2, BLOCK_BYTES / 2, &bones, NULL));
+    must(sinew_pins_layout(basis, 2, &pins_layout));
+    must(sinew_pins_create(basis, 2, block.extra, BLOCK_BYTES, &pins, NULL));
+    must(sinew_pins_create(other_basis, 2, block.structs + BLOCK_BYTES / 2, BLOCK_BYTES / 2, &other_pins, NULL));
     remember();
     tiers();
-    holding();
+    posing();
+    pinning();
     vertices();
     batches();
     return finish();

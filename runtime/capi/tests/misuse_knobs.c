@@ -13,9 +13,7 @@ static SinewLayout decoder_layout, surface_layout;
 
 static SinewDecoderSettings decoder_settings(void)
 {
-    SinewDecoderSettings settings;
-    memset(&settings, 0, sizeof settings);
-    settings.struct_bytes = sizeof settings;
+    SinewDecoderSettings settings = SINEW_INIT(SinewDecoderSettings);
     return settings;
 }
 
@@ -106,16 +104,19 @@ static void feeding(void)
     say("knob name to no buffer", sinew_decoder_knob_name(decoder, 0, name, 0));
     say("knob name into the decoder", sinew_decoder_knob_name(decoder, 0, (char *)block.extra + 64, 33));
     say("knob name of no knob", sinew_decoder_knob_name(decoder, UINT32_MAX, name, 1));
-    say("greeting to NULL", sinew_decoder_greeting(decoder, NULL, 0, taken));
-    say("greeting without a length", sinew_decoder_greeting(decoder, bytes, 37, NULL));
-    say("greeting to a short buffer", sinew_decoder_greeting(decoder, bytes + 64, 36, taken));
+    say("greeting to NULL", sinew_decoder_greeting(decoder, 0, NULL, SINEW_GREETING_BYTES, taken));
+    say("greeting without a length", sinew_decoder_greeting(decoder, 0, bytes, SINEW_GREETING_BYTES, NULL));
+    say("greeting to a short buffer", sinew_decoder_greeting(decoder, 0, bytes + 64, SINEW_GREETING_BYTES - 1, taken));
+    say("greeting to no buffer", sinew_decoder_greeting(decoder, 0, NULL, 0, taken));
+    say("greeting into the decoder", sinew_decoder_greeting(decoder, 0, block.extra + 64, SINEW_GREETING_BYTES, taken));
+    must(sinew_decoder_greeting(decoder, 0, bytes + 64, SINEW_GREETING_BYTES, taken));
+    printf("after all these it is still sent %lu bytes\n", (unsigned long)*taken);
+    remember();
 }
 
 static SinewSurfaceSettings surface_settings(void)
 {
-    SinewSurfaceSettings settings;
-    memset(&settings, 0, sizeof settings);
-    settings.struct_bytes = sizeof settings;
+    SinewSurfaceSettings settings = SINEW_INIT(SinewSurfaceSettings);
     settings.knob_count = 4;
     return settings;
 }
@@ -261,38 +262,36 @@ static void mapping(void)
 
 static void performing(void)
 {
-    SinewReading reading;
+    SinewReading reading = SINEW_INIT(SinewReading);
     SinewSurfaceStatus *status = (SinewSurfaceStatus *)(void *)block.structs;
     SinewKnobState *state = (SinewKnobState *)(void *)block.structs;
-    memset(&reading, 0, sizeof reading);
-    reading.struct_bytes = sizeof reading;
     say_details("advance NULL", sinew_surface_advance(NULL, controls, 0, &details));
     say("advance NULL controls", sinew_surface_advance(surface, NULL, 0, NULL));
     say_details("advance another basis's controls", sinew_surface_advance(surface, other_controls, 0, &details));
     say("advance a decoder", sinew_surface_advance((SinewSurface *)(void *)decoder, controls, 0, NULL));
     details.struct_bytes = 1;
     say("advance with details of a wrong size", sinew_surface_advance(surface, controls, 0, &details));
-    say("take NULL", sinew_surface_take(surface, 0, NULL));
-    say("take with NULL", sinew_surface_take(NULL, 0, &reading));
-    say("take nothing", sinew_surface_take(surface, 0, &reading));
+    say("read NULL", sinew_surface_read(surface, NULL));
+    say("read with NULL", sinew_surface_read(NULL, &reading));
+    say("read nothing", sinew_surface_read(surface, &reading));
     reading.kind = 7;
-    say("take an unknown kind", sinew_surface_take(surface, 0, &reading));
+    say("read an unknown kind", sinew_surface_read(surface, &reading));
     reading.kind = SINEW_READING_KIND_POSITION;
-    say("take a position without scale", sinew_surface_take(surface, 0, &reading));
+    say("read a position without scale", sinew_surface_read(surface, &reading));
     reading.full_scale = 1023;
     reading.value = 1024;
-    say("take a position above its scale", sinew_surface_take(surface, 0, &reading));
+    say("read a position above its scale", sinew_surface_read(surface, &reading));
     reading.value = -1;
-    say("take a position below zero", sinew_surface_take(surface, 0, &reading));
+    say("read a position below zero", sinew_surface_read(surface, &reading));
     reading.value = 1;
     reading.knob = 65536;
-    say("take a knob beyond 16 bits", sinew_surface_take(surface, 0, &reading));
+    say("read a knob beyond 16 bits", sinew_surface_read(surface, &reading));
     reading.kind = SINEW_READING_KIND_STEPS;
     reading.knob = 0;
     reading.value = 40000;
-    say("take more steps than fit", sinew_surface_take(surface, 0, &reading));
+    say("read more steps than fit", sinew_surface_read(surface, &reading));
     reading.struct_bytes = 2;
-    say("take a reading of a wrong size", sinew_surface_take(surface, 0, &reading));
+    say("read a reading of a wrong size", sinew_surface_read(surface, &reading));
     say("unplug NULL", sinew_surface_unplugged(NULL, 0));
     say("replug NULL", sinew_surface_replugged(NULL, 0));
     say("no command", sinew_surface_command(surface, 0, 0));
@@ -320,15 +319,13 @@ static void performing(void)
 static void closing(void)
 {
     size_t *taken = (size_t *)(void *)block.outs;
-    say("close a decoder as a surface", sinew_surface_close((SinewSurface *)(void *)decoder));
-    say("close a surface as a decoder", sinew_decoder_close((SinewDecoder *)(void *)surface));
-    must(sinew_decoder_close(decoder));
-    must(sinew_surface_close(surface));
+    must(sinew_close(decoder));
+    must(sinew_close(surface));
     remember();
     say("feed a closed decoder", sinew_decoder_feed(decoder, 0, block.outs + 64, 1, taken));
     say("advance a closed surface", sinew_surface_advance(surface, controls, 0, NULL));
-    say("close a decoder twice", sinew_decoder_close(decoder));
-    say("close a surface twice", sinew_surface_close(surface));
+    say("close a decoder twice", sinew_close(decoder));
+    say("close a surface twice", sinew_close(surface));
 }
 
 int main(int argc, char **argv)

@@ -7,7 +7,7 @@ mod common;
 use core::time::Duration;
 use std::time::Instant;
 
-use common::player::{Held, Player, Round, Vertices};
+use common::player::{Pins, Player, Round, Vertices};
 use common::{other_package, package};
 use rand::{Rng, SeedableRng, seq::IndexedRandom};
 use rand_chacha::ChaCha8Rng;
@@ -98,7 +98,7 @@ fn play(rng: &mut ChaCha8Rng, player: &mut Player) -> bool {
     overflowed
 }
 
-/// Vertex buffer, held vertices, fast tier and batch of a mutant. Returns whether a drag or a frame overflowed.
+/// Vertex buffer, pins, bones and batch of a mutant. Returns whether a drag or a frame overflowed.
 fn use_all(rng: &mut ChaCha8Rng, player: &mut Player, package: &[u8]) -> bool {
     let mut vertices = Vertices::new(player);
     vertices.write(player).expect("the layout is sound");
@@ -106,15 +106,16 @@ fn use_all(rng: &mut ChaCha8Rng, player: &mut Player, package: &[u8]) -> bool {
     assert!(floats.iter().all(|bytes| f32::from_ne_bytes(*bytes).is_finite()));
 
     let mut overflowed = false;
-    let held = Held::new(player, 2);
+    let pins = Pins::new(player, 2);
     for _ in 0..3 {
         let vertex = rng.random_range(0..player.info.vertex_count + 1);
         let target = core::array::from_fn(|_| *WEIGHTS.choose(rng).expect("some"));
-        let (added, aimed) = (held.add(player, vertex), held.aim(vertex, target));
+        let (added, aimed) = (pins.add(player, vertex), pins.aim(vertex, target));
         assert!(![added, aimed].contains(&SinewStatus::Internal), "{added:?} {aimed:?}");
-        match held.drag(player) {
+        match pins.drag(player) {
+            Err(SinewStatus::NeedsExactTier) => assert_eq!(player.info.has_exact_tier, 0),
             Ok(report) => assert!(report.step_count <= 2),
-            Err(SinewStatus::HeldOverflow) => overflowed = true,
+            Err(SinewStatus::PinOverflow) => overflowed = true,
             Err(other) => panic!("{other:?}"),
         }
     }
@@ -124,14 +125,14 @@ fn use_all(rng: &mut ChaCha8Rng, player: &mut Player, package: &[u8]) -> bool {
     assert_eq!(status, SinewStatus::Ok);
     assert!(weights.iter().all(|weight| weight.is_finite()));
 
-    let mut fast = None;
-    if player.info.fast_node_count > 0 {
-        let mut own = Player::of_tier(package, SinewTier::Fast).expect("it opened");
+    let mut bones = None;
+    if player.info.bone_count > 0 {
+        let mut own = Player::of_tier(package, SinewTier::Bones).expect("it opened");
         overflowed |= play(rng, &mut own);
-        fast = Some(own);
+        bones = Some(own);
     }
     let mut instances = vec![player.instance()];
-    instances.extend(fast.as_mut().map(Player::instance));
+    instances.extend(bones.as_mut().map(Player::instance));
     let round = Round::new(player.basis, &instances);
     assert_eq!(round.play(player.basis), instances.len());
     for n in 0..instances.len() {
@@ -164,15 +165,12 @@ fn what_opens_plays() {
                 overflowed += u32::from(play(&mut rng, &mut player));
                 overflowed_elsewhere += u32::from(use_all(&mut rng, &mut player, &mutant));
             }
-            Err(status) => assert!(
-                status as i32 >= SinewStatus::PackageTooShort as i32,
-                "case {case}: {status:?}"
-            ),
+            Err(status) => assert_eq!(status, SinewStatus::PackageRefused, "case {case}"),
         }
     }
     println!(
         "{case_count} mutants: {opened} opened, {overflowed} overflowed in a frame, {overflowed_elsewhere} in a drag or \
-         the fast tier"
+         the bones"
     );
     assert!(opened > case_count / 10, "{opened}");
     assert!(overflowed > 0 && overflowed_elsewhere > 0);

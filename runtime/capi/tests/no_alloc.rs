@@ -3,58 +3,12 @@
 
 mod common;
 
-use core::alloc::{GlobalAlloc, Layout};
-use core::cell::Cell;
 use core::ptr::{null, null_mut};
-use std::alloc::System;
 
-use common::player::{Held, Memory, Player, Round, Vertices, layout_bytes, sized};
+use common::player::{Memory, Pins, Player, Round, Vertices, layout_bytes, sized};
 use common::{other_package, package};
 use sinew::*;
-
-thread_local! {
-    /// Requests of this thread. The test harness allocates on others.
-    static REQUESTS: Cell<u64> = const { Cell::new(0) };
-}
-
-struct Counting;
-
-// SAFETY: every request goes to the system's allocator unchanged; counting touches a thread's own cell without heap.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        REQUESTS.set(REQUESTS.get() + 1);
-        // SAFETY: the caller's promise, passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        REQUESTS.set(REQUESTS.get() + 1);
-        // SAFETY: the caller's promise, passed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, new_bytes: usize) -> *mut u8 {
-        REQUESTS.set(REQUESTS.get() + 1);
-        // SAFETY: the caller's promise, passed on.
-        unsafe { System.realloc(pointer, layout, new_bytes) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-/// Runs `work` and returns how often it went to the allocator.
-fn requests(work: impl FnOnce()) -> u64 {
-    let before = REQUESTS.get();
-    work();
-    REQUESTS.get() - before
-}
-
-#[test]
-fn the_counter_counts() {
-    assert_eq!(requests(|| drop(core::hint::black_box(Box::new(1)))), 2);
-    assert_eq!(requests(|| ()), 0);
-}
+use sinew_support::requests;
 
 #[test]
 fn a_thousand_frames_allocate_nothing() {
@@ -82,25 +36,40 @@ fn opening_creating_asking_and_closing_allocate_nothing() {
     let (bytes, mut damaged) = (package(), package());
     damaged.as_mut_slice()[100] ^= 1;
     let mut player = Player::new(&bytes).expect("valid");
+    let other = Player::new(&bytes).expect("valid");
     let [basis_memory, workspace_memory, controls_memory] = player.memory();
     let memory = [basis_memory, workspace_memory, controls_memory].map(|memory| (memory.pointer(), memory.bytes()));
     let (mut basis, mut workspace, mut controls) = (null_mut(), null_mut(), null_mut());
     let mut details = sized::<SinewDetails>();
     let mut name = [0; SINEW_NAME_BYTES];
     let (mut control, mut minimum, mut weights) = (7, 0.0, [0.0; 4]);
+    let mut block = Memory::new(1 << 16);
+    let mut layout = SinewLayout {
+        size_bytes: 0,
+        alignment: 0,
+    };
+    let mut made = sized::<SinewPlayer>();
     let count = requests(|| {
         // SAFETY: the player's memory stands, and nobody uses its handles meanwhile.
         unsafe {
             let details = details.as_mut_ptr();
             let [(at, room), ..] = memory;
             let open = |bytes: &[u8], basis: &mut *mut SinewBasis| {
-                sinew_basis_open(SINEW_ABI_VERSION, bytes.as_ptr(), bytes.len(), at, room, basis, details)
+                sinew_basis_open(
+                    SINEW_ABI_VERSION,
+                    bytes.as_ptr().cast(),
+                    bytes.len(),
+                    at,
+                    room,
+                    basis,
+                    details,
+                )
             };
-            assert_eq!(open(&damaged, &mut basis), SinewStatus::PackagePayloadCorrupt);
+            assert_eq!(open(&damaged, &mut basis), SinewStatus::PackageRefused);
             assert_eq!(open(&bytes, &mut basis), SinewStatus::Ok);
             let (at, room) = memory[1];
             assert_eq!(
-                sinew_workspace_create(basis, at, room, &mut workspace, details),
+                sinew_workspace_create(basis, null(), at, room, &mut workspace, details),
                 SinewStatus::Ok
             );
             let (at, room) = memory[2];
@@ -131,9 +100,19 @@ fn opening_creating_asking_and_closing_allocate_nothing() {
             );
             let played = sinew_frame(basis, workspace, controls, null(), null_mut(), details);
             assert_eq!(played, SinewStatus::NullPointer);
-            assert_eq!(sinew_controls_close(controls), SinewStatus::Ok);
-            assert_eq!(sinew_workspace_close(workspace), SinewStatus::Ok);
-            assert_eq!(sinew_basis_close(basis), SinewStatus::Ok);
+            let (from_basis, from) = (other.basis, other.controls);
+            let status = sinew_controls_carry(from_basis, from, basis, controls, null_mut());
+            assert_eq!(status, SinewStatus::Ok);
+            for handle in [controls.cast(), workspace.cast(), basis.cast()] {
+                assert_eq!(sinew_close(handle), SinewStatus::Ok);
+            }
+            let (at, room) = (block.pointer(), block.bytes());
+            let (bytes, length) = (bytes.as_ptr().cast(), bytes.len());
+            let status = sinew_player_layout(bytes, length, null(), &mut layout, details);
+            assert_eq!((status, layout.size_bytes <= room), (SinewStatus::Ok, true));
+            let out = made.as_mut_ptr();
+            let status = sinew_player_open(SINEW_ABI_VERSION, bytes, length, null(), at, room, out, details);
+            assert_eq!(status, SinewStatus::Ok);
         }
     });
     assert_eq!(count, 0);
@@ -159,9 +138,9 @@ fn frames_that_overflow_allocate_nothing() {
 fn knobs_drags_buffers_and_batches_allocate_nothing() {
     let bytes = package();
     let mut player = Player::new(&bytes).expect("valid");
-    let mut fast = Player::of_tier(&bytes, SinewTier::Fast).expect("it has one");
-    let (held, mut vertices) = (Held::new(&player, 2), Vertices::new(&player));
-    let round = Round::new(player.basis, &[player.instance(), fast.instance()]);
+    let mut bones = Player::of_tier(&bytes, SinewTier::Bones).expect("it has one");
+    let (pins, mut vertices) = (Pins::new(&player, 2), Vertices::new(&player));
+    let round = Round::new(player.basis, &[player.instance(), bones.instance()]);
     let mut settings = sized::<SinewSurfaceSettings>();
     // SAFETY: zero is as usual everywhere else.
     let settings = unsafe {
@@ -185,10 +164,10 @@ fn knobs_drags_buffers_and_batches_allocate_nothing() {
             let (at, room) = (more.pointer(), more.bytes());
             let status = sinew_surface_create(player.basis, &settings, at, room, &mut surface, null_mut());
             assert_eq!(status, SinewStatus::Ok);
-            assert_eq!(held.add(&player, 1), SinewStatus::Ok);
+            assert_eq!(pins.add(&player, 1), SinewStatus::Ok);
             for frame in 0..200 {
                 let (now_us, mut taken) = (frame * 16_667, 0);
-                let status = sinew_decoder_feed(decoder, now_us, line.as_ptr(), line.len(), &mut taken);
+                let status = sinew_decoder_feed(decoder, now_us, line.as_ptr().cast(), line.len(), &mut taken);
                 assert_eq!((status, taken), (SinewStatus::Ok, line.len()));
                 loop {
                     let reading = reading.as_mut_ptr();
@@ -196,14 +175,14 @@ fn knobs_drags_buffers_and_batches_allocate_nothing() {
                     if (*reading).kind == SinewReadingKind::None as i32 {
                         break;
                     }
-                    assert_eq!(sinew_surface_take(surface, now_us, reading), SinewStatus::Ok);
+                    assert_eq!(sinew_surface_read(surface, reading), SinewStatus::Ok);
                 }
                 let status = sinew_surface_advance(surface, player.controls, now_us, null_mut());
                 assert_eq!(status, SinewStatus::Ok);
                 let status = sinew_decoder_counters(decoder, now_us, counters.as_mut_ptr());
                 assert_eq!(status, SinewStatus::Ok);
-                assert_eq!(held.aim(1, [0.1, frame as f32 * 0.01, 0.3]), SinewStatus::Ok);
-                moved += held.drag(&player).expect("finite").step_count;
+                assert_eq!(pins.aim(1, [0.1, frame as f32 * 0.01, 0.3]), SinewStatus::Ok);
+                moved += pins.drag(&player).expect("finite").step_count;
                 round.begin();
                 assert_eq!(round.play(player.basis), 2);
                 vertices.write(&player).expect("sound");
@@ -225,11 +204,11 @@ fn memory_beyond_a_layout_stays_untouched() {
     let mut workspace = null_mut();
     // SAFETY: the memory stands.
     let tail = unsafe {
-        let status = sinew_workspace_create(player.basis, at, room, &mut workspace, null_mut());
+        let status = sinew_workspace_create(player.basis, null(), at, room, &mut workspace, null_mut());
         assert_eq!(status, SinewStatus::Ok);
         player.workspace = workspace;
         assert!(player.frame().is_ok());
-        core::slice::from_raw_parts(at.add(size_bytes), 640)
+        core::slice::from_raw_parts(at.cast::<u8>().add(size_bytes), 640)
     };
     assert!(tail.iter().all(|&byte| byte == 0xaa));
 }

@@ -1,7 +1,7 @@
 //! Sinew on a bare Cortex-M7: no operating system, no allocator, no std.
 //!
 //! Path of data: bytes of a knob box on UART 0 -> lines of positions from 0 to 1023 joined by `|` -> weights -> frame ->
-//! one line back: the checksum over positions and normals of all frames so far. The first line is thrown away, for it may
+//! one line back: the checksum (FNV-1a) over positions and normals of all frames so far. The first line is thrown away, for it may
 //! be cut; a line that is none is answered with `refused` and a reason and moves nothing. The byte 4 (end of transmission)
 //! ends the program by way of the debugger (semihosting), which QEMU understands. The package comes in at compile time,
 //! from the path in `SINEW_EMBEDDED_PACKAGE`.
@@ -11,13 +11,14 @@
 mod uart;
 
 use core::fmt::{self, Write};
+use core::hash::Hasher;
 use core::panic::PanicInfo;
 
 use cortex_m_rt::entry;
 use cortex_m_semihosting::debug::{self, EXIT_FAILURE, EXIT_SUCCESS};
-use sinew_checksum::{Checksum, FULL_SCALE, weight};
-use sinew_runtime::input::protocol::Lines;
-use sinew_runtime::input::{FullScale, KnobEvent, Reading};
+use fnv::FnvHasher;
+use sinew_knobs::protocol::Lines;
+use sinew_knobs::{FullScale, KnobEvent, Reading};
 use sinew_runtime::{Basis, ControlError, Controls, Frame, FrameError, OpenError, Workspace, WorkspaceError};
 
 use uart::Uart;
@@ -30,6 +31,9 @@ static PACKAGE: &Aligned<[u8]> = &Aligned(*include_bytes!(env!(
     "SINEW_EMBEDDED_PACKAGE",
     "set SINEW_EMBEDDED_PACKAGE to the path of a baked package"
 )));
+
+/// What a knob of ten bits reads at its upper stop.
+const FULL_SCALE: u16 = 1023;
 
 /// What fits the board's 4 MiB of data memory beside the stack.
 const VERTEX_LIMIT: usize = 8 * 1024;
@@ -77,7 +81,7 @@ fn perform(
     let mut workspace = Workspace::new(&basis, memory).map_err(Failure::Workspace)?;
     let mut controls = Controls::new(&basis, &mut weights[..component_count]).map_err(Failure::Controls)?;
     let (positions, normals) = (&mut positions[..vertex_count], &mut normals[..vertex_count]);
-    let mut checksum = Checksum::START;
+    let mut checksum = FnvHasher::default();
     let mut lines = Lines::new(FullScale::Fixed(FULL_SCALE));
     loop {
         let byte = uart.receive();
@@ -98,8 +102,10 @@ fn perform(
                 normals: Some(normals),
             };
             job.run(&mut workspace).map_err(Failure::Frame)?;
-            checksum = checksum.with(positions).with(normals);
-            writeln!(uart, "{checksum}")
+            for x in [&*positions, normals].into_iter().flatten().flatten() {
+                checksum.write(&x.to_bits().to_le_bytes());
+            }
+            writeln!(uart, "{:016x}", checksum.finish())
         } else if let Some(fault) = lines.counters().last_fault.filter(|_| lines.counters().bad > bad) {
             writeln!(uart, "refused: {fault}")
         } else {
@@ -116,7 +122,7 @@ fn turn(controls: &mut Controls<'_>, event: KnobEvent) -> Result<(), ControlErro
     if let Reading::Position { value, .. } = event.reading
         && k < controls.basis().component_count()
     {
-        controls.set(k, weight(&controls.basis().component(k), value))?;
+        controls.set_share(k, f32::from(value) / f32::from(FULL_SCALE))?;
     }
     Ok(())
 }

@@ -6,7 +6,8 @@ use core::time::Duration;
 use std::thread;
 use std::time::Instant;
 
-use sinew_runtime::input::{Clock, ControlSource, Protocol, SerialSelector, SerialSettings, SerialSource};
+use sinew_knobs::device::{Clock, SerialSelector, SerialSettings, SerialSource};
+use sinew_knobs::{ControlSource, Protocol};
 use sinew_simulator::Port;
 
 const LINES: u32 = 3000;
@@ -70,6 +71,7 @@ fn main() {
     );
     quantiles("poll with nothing to hear", "ns", idle);
     quantiles("poll with 8 events", "ns", full);
-    let counts = source.status();
-    println!("{} lines, {} bad, {} dropped", counts.good, counts.bad, counts.dropped);
+    let status = source.device_status();
+    let counts = status.counters;
+    println!("{} lines, {} bad, {} dropped", counts.good, counts.bad, status.replaced);
 }

@@ -3,18 +3,16 @@
 //! what the frame's thread allocates, and does the same under a flood of 1 Mbaud, with the memory of the process watched.
 //! `cargo bench -p sinew-simulator --bench show -- [SECONDS of flood]`, 10 unless said.
 
-use core::alloc::{GlobalAlloc, Layout};
-use core::cell::Cell;
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use core::time::Duration;
-use std::alloc::System;
 use std::thread;
 
-use sinew_peers::subject::Subject;
-use sinew_runtime::input::{
-    Binding, Clock, ControlMap, ControlSource, ControlSurface, Knob, KnobEvent, KnobState, Protocol, Reading,
-    SerialSelector, SerialSettings, SerialSource, SlotState, SourceEvent, SurfaceLayout, SurfaceSettings, Takeover,
+use sinew_knobs::device::{Clock, SerialSelector, SerialSettings, SerialSource};
+use sinew_knobs::{
+    Binding, ControlMap, ControlSource, ControlSurface, Knob, KnobEvent, Protocol, Reading, SourceEvent,
+    SurfaceBuffers, SurfaceSettings, Takeover,
 };
+use sinew_peers::subject::Subject;
 use sinew_runtime::{Basis, Controls, Frame, Workspace, WorkspaceLayout};
 use sinew_simulator::Port;
 
@@ -27,30 +25,6 @@ const VALUES: u16 = 1024;
 const FLOOD_BYTES: usize = 100;
 /// Not a multiple of the frame, so that lines fall anywhere in it.
 const LINE_EVERY: Duration = Duration::from_micros(11_300);
-
-thread_local! {
-    static REQUESTS: Cell<u64> = const { Cell::new(0) };
-}
-
-struct Counting;
-
-// SAFETY: every request goes to the system's allocator unchanged; counting touches a thread's own cell without heap.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        REQUESTS.set(REQUESTS.get() + 1);
-        // SAFETY: the caller's promise, passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        REQUESTS.set(REQUESTS.get() + 1);
-        // SAFETY: the caller's promise, passed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 fn main() {
     let seconds = std::env::args()
@@ -101,12 +75,8 @@ fn play(subject: &Subject, name: &str, seconds: u64, is_flood: bool) {
         })
         .collect();
     let map = ControlMap::new(basis, &knobs, &bindings, &[], None).expect("a sound map");
-    let layout = SurfaceLayout::for_map(&map);
-    let (mut states, mut slots) = (
-        vec![KnobState::default(); layout.knob_count],
-        vec![SlotState::default(); layout.slot_count],
-    );
-    let mut surface = ControlSurface::new(map, SurfaceSettings::default(), &mut states, &mut slots).expect("memory");
+    let mut buffers = SurfaceBuffers::for_map(&map);
+    let mut surface = ControlSurface::new(map, SurfaceSettings::default(), buffers.memory()).expect("memory");
     let mut weights = vec![0.0; basis.component_count()];
     let mut controls = Controls::new(&basis, &mut weights).expect("a weight a component");
     let mut memory = vec![0; WorkspaceLayout::for_basis(&basis).unaligned_bytes()];
@@ -143,31 +113,31 @@ fn play(subject: &Subject, name: &str, seconds: u64, is_flood: bool) {
                 source.poll(clock.now_us(), &mut |_, _| {});
                 before_kib = resident_kib();
             }
-            let requests_before = REQUESTS.get();
             let at_us = clock.now_us();
-            let mut newest = None;
-            source.poll(at_us, &mut |event_us, event| {
-                surface.source_event(event_us, event);
-                if let SourceEvent::Knob(KnobEvent {
-                    knob: 0,
-                    reading: Reading::Position { value, .. },
-                }) = event
-                {
-                    newest = Some(value);
-                }
+            let (mut newest, mut polled_us, mut advanced_us) = (None, 0, 0);
+            requests += sinew_support::requests(|| {
+                source.poll(at_us, &mut |event_us, event| {
+                    surface.source_event(event_us, event);
+                    if let SourceEvent::Knob(KnobEvent {
+                        knob: 0,
+                        reading: Reading::Position { value, .. },
+                    }) = event
+                    {
+                        newest = Some(value);
+                    }
+                });
+                polled_us = clock.now_us();
+                surface.advance(polled_us, &mut controls).expect("its own controls");
+                advanced_us = clock.now_us();
+                let job = Frame {
+                    basis: &basis,
+                    controls: &controls,
+                    positions: &mut positions,
+                    normals: Some(&mut normals),
+                };
+                job.run(&mut workspace).expect("weights within their stops");
             });
-            let polled_us = clock.now_us();
-            surface.advance(polled_us, &mut controls).expect("its own controls");
-            let advanced_us = clock.now_us();
-            let job = Frame {
-                basis: &basis,
-                controls: &controls,
-                positions: &mut positions,
-                normals: Some(&mut normals),
-            };
-            job.run(&mut workspace).expect("weights within their stops");
             let done_us = clock.now_us();
-            requests += REQUESTS.get() - requests_before;
             late += u32::from(done_us > due_us + FRAME_US);
             poll.push((polled_us - at_us) as f64);
             advance.push((advanced_us - polled_us) as f64);
@@ -184,14 +154,14 @@ fn play(subject: &Subject, name: &str, seconds: u64, is_flood: bool) {
     quantiles("  of it: poll, with the surface's events", poll);
     quantiles("  of it: surface to weights", advance);
     quantiles("  of it: weights to mesh", frame);
-    let status = source.status();
+    let status = source.device_status();
     println!(
         "{frame_count} frames, {late} late; {requests} requests to the allocator in them; {} bytes, {} lines, {} bad, {} events replaced \
          by newer ones; memory {before_kib} -> {} KiB",
-        status.bytes,
-        status.good,
-        status.bad,
-        status.dropped,
+        status.counters.bytes,
+        status.counters.good,
+        status.counters.bad,
+        status.replaced,
         resident_kib()
     );
 }

@@ -2,8 +2,8 @@
 
 use core::fmt;
 
-use sinew_runtime::input::Protocol;
-use sinew_runtime::input::protocol::{FrameKind, write_frame};
+use sinew_knobs::Protocol;
+use sinew_knobs::protocol::{FrameKind, write_frame};
 
 /// A way of speaking a protocol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -103,7 +103,7 @@ impl Dialect {
         }
     }
 
-    /// The address under which a host hears a knob; see [`sinew_runtime::input::protocol`].
+    /// The address under which a host hears a knob; see [`sinew_knobs::protocol`].
     pub const fn address(self, knob: u16) -> u16 {
         match self {
             Self::Midi => FIRST_CONTROLLER + knob,

@@ -1,8 +1,8 @@
 //! Drag: one update of the weights while the user drags. A fixed number of Gauss-Newton steps, coarse components first.
 
-use super::reach::Reach;
+use super::reach::{Likely, Reach};
 use super::{HandleError, Handles};
-use crate::basis::Basis;
+use crate::basis::{Basis, Tier};
 use crate::controls::Controls;
 use crate::decode::flushed;
 use crate::workspace::Workspace;
@@ -15,6 +15,11 @@ const LEVEL_RIDGE: f64 = 1e-2;
 /// The same for all components together, at the end (0.2 % of it): what is left to reach is reached, unless it takes
 /// components that have next to nothing to do with it.
 const JOINT_RIDGE: f64 = 4e-6;
+/// How much weaker the joint pass gets with every further handle, where the package knows its weights: one vertex comes to where it is
+/// pulled, however unlikely; of many, what the likely weights leave is noise.
+const DOUBT: f64 = 4.0;
+/// Handles beyond which that does not matter any more.
+const MOST_DOUBTS: usize = 24;
 /// How far a step brings a handle at most, as a share of the diagonal: farther than the linear problem is to be believed.
 const STRIDE: f64 = 0.04;
 /// How many times as strong the ridge is after a step that was worse than none. It lasts: mouse and mesh go on from here.
@@ -28,7 +33,8 @@ const CAUTION_MAX: f64 = 65_536.0;
 ///
 /// Each component's step is measured in its range, and kept to its stops (a control that stands beyond one may stay or come
 /// back, never go further). Weights hold to where they are: of all ways to move the handles, the one with the least sum of
-/// squared steps. Coarse components go as far as they are of use, then finer ones, then all. Pinned components do not
+/// squared steps. A package that knows the weights of its training shapes goes there as those would first, then as all
+/// components can; without, coarse components go as far as they are of use, then finer ones, then all. Pinned components do not
 /// move. What no component can reach stays as near as it gets.
 ///
 /// The workspace lends its kernels and keeps its pose; run a [`crate::Frame`] afterwards.
@@ -62,7 +68,7 @@ impl Drag<'_, '_, '_> {
         workspace
             .validate_exact(self.basis)
             .map_err(HandleError::of_workspace)?;
-        if self.controls.basis().id() == self.basis.id() {
+        if self.controls.basis().identity() == self.basis.identity() {
             Ok(())
         } else {
             Err(HandleError::ForeignControls)
@@ -76,12 +82,21 @@ impl Drag<'_, '_, '_> {
     /// controls then stay.
     pub fn run(self, workspace: &mut Workspace<'_>) -> Result<DragReport, HandleError> {
         self.validate(workspace)?;
+        let tier = workspace
+            .validate_exact(self.basis)
+            .map_err(HandleError::of_workspace)?;
         let Self {
             basis,
             handles,
             controls,
         } = self;
-        handles.begin(basis, controls.weights(), workspace)?;
+        if handles.count == 0 {
+            return Ok(DragReport {
+                misfit: 0.0,
+                step_count: 0,
+            });
+        }
+        handles.begin(basis, &tier, controls.weights(), workspace)?;
         let mut squared = handles.squared_misfit(handles.positions);
         let mut step_count = 0;
         let mut is_linearised = false;
@@ -90,12 +105,12 @@ impl Drag<'_, '_, '_> {
                 break;
             }
             if !is_linearised {
-                handles.linearise(basis, workspace);
+                handles.linearise(basis, &tier, workspace);
                 handles.scale_jacobian(basis);
                 is_linearised = true;
             }
             handles.step(basis);
-            let is_finite = handles.evaluate(basis, workspace);
+            let is_finite = handles.evaluate(basis, &tier, workspace);
             let trial = handles.squared_misfit(handles.trial_positions);
             // A number that is not one is no improvement.
             if is_finite && trial < squared {
@@ -109,7 +124,7 @@ impl Drag<'_, '_, '_> {
             }
         }
         for (k, &w) in handles.memory.evaluated.iter().enumerate() {
-            if w != handles.memory.start[k] {
+            if w != flushed(controls.weights()[k]) {
                 let set = controls.set_unclamped(k, w);
                 debug_assert!(set.is_ok(), "weights within limits are finite");
             }
@@ -123,8 +138,19 @@ impl Drag<'_, '_, '_> {
 
 impl Handles<'_> {
     /// Takes `weights` as the start and sees to it that the held vertices are known there.
-    fn begin(&mut self, basis: &Basis<'_>, weights: &[f32], workspace: &mut Workspace<'_>) -> Result<(), HandleError> {
-        self.memory.start.copy_from_slice(weights);
+    fn begin(
+        &mut self,
+        basis: &Basis<'_>,
+        tier: &Tier<'_>,
+        weights: &[f32],
+        workspace: &Workspace<'_>,
+    ) -> Result<(), HandleError> {
+        let counts_on = self.is_started && !basis.prior().mean.is_empty();
+        for (k, &w) in weights.iter().enumerate() {
+            // What a slider moved since the last update is where the user wants it.
+            let counted = self.memory.start[k] + (w - self.memory.evaluated[k]);
+            self.memory.start[k] = if counts_on && counted.is_finite() { counted } else { w };
+        }
         let is_known = self.is_evaluated
             && weights
                 .iter()
@@ -132,7 +158,7 @@ impl Handles<'_> {
                 .all(|(&w, &e)| flushed(w) == e);
         if !is_known {
             self.memory.trial.copy_from_slice(weights);
-            if !self.evaluate(basis, workspace) {
+            if !self.evaluate(basis, tier, workspace) {
                 let is_bad = |p: &[f32; 3]| !p.iter().all(|x| x.is_finite());
                 let n = self.trial_positions[..self.count].iter().position(is_bad).unwrap_or(0);
                 return Err(HandleError::NotFinite {
@@ -145,10 +171,13 @@ impl Handles<'_> {
             let component = basis.component(k);
             let range = component.maximum - component.minimum;
             let movable = range > 0.0 && self.memory.pinned[k] == 0;
-            let share = |stop: f32| if movable { (stop - w) / range } else { 0.0 };
-            self.memory.lower[k] = share(component.minimum).min(0.0);
-            self.memory.upper[k] = share(component.maximum).max(0.0);
+            let start = self.memory.start[k];
+            self.memory.inverse_ranges[k] = if range > 0.0 { 1.0 / range } else { 0.0 };
+            let share = |stop: f32| if movable { (stop - start) / range } else { 0.0 };
+            self.memory.lower[k] = share(component.minimum.min(w)).min(0.0);
+            self.memory.upper[k] = share(component.maximum.max(w)).max(0.0);
         }
+        self.is_started = true;
         Ok(())
     }
 
@@ -207,18 +236,44 @@ impl Handles<'_> {
             is_free: memory.is_free,
             gram: &mut memory.gram[..rows * rows],
             multipliers: &mut memory.multipliers[..rows],
+            projected: memory.projected,
         };
-        let levels = basis.components().map(|component| component.level).max().unwrap_or(0);
-        for level in 0..=levels {
-            reach.pass(self.caution * LEVEL_RIDGE, |k| basis.component(k).level == level);
+        let prior = basis.prior();
+        // A ridge that holds to where the steps are counted from would pull back there: who counts on goes a part of the way instead.
+        let (joint_ridge, share) = if prior.mean.is_empty() {
+            (self.caution * JOINT_RIDGE, 1.0)
+        } else {
+            let others = self.count.saturating_sub(1).min(MOST_DOUBTS);
+            let doubt = (0..others).fold(1.0, |doubt, _| DOUBT * doubt);
+            (doubt * JOINT_RIDGE, 1.0 / libm::sqrt(self.caution) as f32)
+        };
+        if prior.mean.is_empty() {
+            let levels = basis.components().map(|component| component.level).max().unwrap_or(0);
+            for level in 0..=levels {
+                reach.pass(self.caution * LEVEL_RIDGE, &Likely::Alike, |k| {
+                    basis.component(k).level == level
+                });
+            }
+        } else {
+            let likely = Likely::Known {
+                prior,
+                shares: memory.inverse_ranges,
+            };
+            reach.pass(f64::from(prior.strength), &likely, |_| true);
         }
-        reach.pass(self.caution * JOINT_RIDGE, |_| true);
+        reach.pass(joint_ridge, &Likely::Alike, |_| true);
         for (k, component) in basis.components().enumerate() {
             let (start, range) = (memory.start[k], component.maximum - component.minimum);
-            memory.trial[k] = match memory.offsets[k] {
+            let wanted = match memory.offsets[k] {
                 0.0 => start,
                 // Once more to the stops: the shares were rounded.
                 offset => (start + offset * range).clamp(component.minimum.min(start), component.maximum.max(start)),
+            };
+            let now = memory.evaluated[k];
+            memory.trial[k] = if share < 1.0 {
+                now + share * (wanted - now)
+            } else {
+                wanted
             };
         }
     }

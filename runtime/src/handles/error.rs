@@ -12,7 +12,7 @@ pub enum HandleError {
     ForeignHandles,
     /// The workspace was made for another basis.
     ForeignWorkspace,
-    /// The workspace was made for the fast tier: handles hold vertices of the exact one.
+    /// The workspace was made for bones: handles hold vertices of the exact one.
     NeedsExactTier,
     /// The controls belong to another basis.
     ForeignControls,

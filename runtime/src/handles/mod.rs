@@ -15,12 +15,17 @@ pub use error::HandleError;
 
 use sinew_formats::package::GROUP_NODES;
 
-use crate::basis::Basis;
+use self::reach::Likely;
+
+use crate::basis::{Basis, Identity, with_index};
+use crate::decode::shares_at_rest;
 use crate::error::WorkspaceError;
-use crate::simd::adjoint::{HeldSums, Pull, TOGETHER, pull};
-use crate::simd::decode::{Group, Share};
+use crate::memory::{ALIGNMENT, Carver};
+use crate::simd::generic::adjoint::{HeldSums, Pull, TOGETHER, pull};
+use crate::simd::generic::decode::{Group, Share};
+use crate::simd::generic::solve::{Quad, Rings, place, put};
 use crate::solve::substitute;
-use crate::workspace::{ALIGNMENT, Workspace, carve, section_bytes};
+use crate::workspace::Workspace;
 
 /// Most handles at once: the small system of a drag grows with the cube of their number.
 pub const HANDLES_MAX: usize = 64;
@@ -38,8 +43,10 @@ impl HandlesLayout {
     /// Layout for `capacity` handles, of which more than [`HANDLES_MAX`] count as that many: 12 bytes a vertex for each of
     /// them, 36 a vertex for all, and about 800 a component.
     pub fn for_basis(basis: &Basis<'_>, capacity: usize) -> Self {
+        let mut carver = Carver::measuring();
+        Handles::carve(basis, capacity, &mut carver);
         Self {
-            size_bytes: Sections::of(basis, capacity).size_bytes(),
+            size_bytes: carver.bytes(),
             alignment: ALIGNMENT,
         }
     }
@@ -50,53 +57,11 @@ impl HandlesLayout {
     }
 }
 
-/// Element counts of the buffers.
-struct Sections {
-    capacity: usize,
-    groups: usize,
-    components: usize,
-}
-
-impl Sections {
-    fn of(basis: &Basis<'_>, capacity: usize) -> Self {
-        Self {
-            capacity: capacity.min(HANDLES_MAX),
-            groups: basis.vertex_count().div_ceil(GROUP_NODES),
-            components: basis.component_count(),
-        }
-    }
-
-    /// Rows of the small system: three a handle.
-    fn rows(&self) -> usize {
-        3 * self.capacity
-    }
-
-    /// Saturates where 32 bits are too few: then no memory is large enough.
-    fn size_bytes(&self) -> usize {
-        let (handles, rows) = (self.capacity, self.rows());
-        [
-            section_bytes::<u32>(handles),
-            3 * section_bytes::<[f32; 3]>(handles),
-            section_bytes::<Pull>(handles.saturating_mul(self.groups)),
-            section_bytes::<Group<f32>>(self.groups),
-            section_bytes::<HeldSums>(handles.div_ceil(TOGETHER)),
-            section_bytes::<HeldSums>(self.components),
-            section_bytes::<Share>(self.components),
-            8 * section_bytes::<f32>(self.components),
-            section_bytes::<f32>(rows * self.components),
-            section_bytes::<f64>(rows * rows),
-            2 * section_bytes::<f64>(rows),
-        ]
-        .into_iter()
-        .fold(0, usize::saturating_add)
-    }
-}
-
 /// Held vertices, their targets, and the components that dragging leaves alone. Lives in the caller's memory; belongs to one
 /// basis. A vertex is held once at most and is named by its source index.
 #[derive(Debug)]
 pub struct Handles<'h> {
-    basis_id: [u8; 16],
+    basis: Identity,
     count: usize,
     /// Of the basis: length of the diagonal of the rest shape's bounding box, positive.
     diagonal: f64,
@@ -104,6 +69,8 @@ pub struct Handles<'h> {
     caution: f64,
     /// Whether `evaluated` is what `features`, `slopes` and `positions` belong to.
     is_evaluated: bool,
+    /// Whether `start` is that of the vertices that are held.
+    is_started: bool,
     /// Source order. Shape: `[capacity]`.
     vertices: &'h mut [u32],
     /// Shape: `[capacity]`, units of the source.
@@ -112,9 +79,9 @@ pub struct Handles<'h> {
     positions: &'h mut [[f32; 3]],
     /// Held vertices at a step that may be taken. Shape: `[capacity]`.
     trial_positions: &'h mut [[f32; 3]],
-    /// Shape: `[capacity][G]`, lanes.
+    /// Shape: `[capacity][G]`, slots.
     pulls: &'h mut [Pull],
-    /// Shape: `[G]`, lanes.
+    /// Shape: `[G]`, slots.
     features: &'h mut [Group<f32>],
     /// Shape: `[ceil(capacity / TOGETHER)]`.
     held_sums: &'h mut [HeldSums],
@@ -134,7 +101,8 @@ struct Memory<'h> {
     is_free: &'h mut [u32],
     /// Weights that the held positions belong to. Shape: `[K]`.
     evaluated: &'h mut [f32],
-    /// Weights when the drag began. Shape: `[K]`.
+    /// Weights that steps are counted from: in a package that knows its weights those when the held vertices were last chosen, moved by
+    /// what others have moved since; in any other those when the update began. Shape: `[K]`.
     start: &'h mut [f32],
     /// Weights of a step that may be taken. Shape: `[K]`.
     trial: &'h mut [f32],
@@ -152,6 +120,10 @@ struct Memory<'h> {
     residual: &'h mut [f64],
     /// Shape: `[3 * capacity]`.
     multipliers: &'h mut [f64],
+    /// One over each control's range, 0 where it has none. Shape: `[K]`.
+    inverse_ranges: &'h mut [f32],
+    /// Scratch of a pass that knows the weights. Shape: the prior's factors and its mean `[Q][3 * capacity]`.
+    projected: &'h mut [f64],
 }
 
 impl<'h> Handles<'h> {
@@ -160,69 +132,55 @@ impl<'h> Handles<'h> {
     /// # Errors
     /// [`WorkspaceError::TooSmall`], with the size that this memory would need given where it starts.
     pub fn new(basis: &Basis<'_>, capacity: usize, memory: &'h mut [u8]) -> Result<Self, WorkspaceError> {
-        let sections = Sections::of(basis, capacity);
-        let skipped = memory.as_ptr().align_offset(ALIGNMENT);
-        let required_bytes = skipped.saturating_add(sections.size_bytes());
-        if memory.len() < required_bytes {
-            return Err(WorkspaceError::TooSmall {
-                required_bytes,
-                actual_bytes: memory.len(),
-            });
-        }
-        let memory = &mut memory[skipped..required_bytes];
-        memory.fill(0);
-        let (handles, rows, components) = (sections.capacity, sections.rows(), sections.components);
-        let (vertices, memory) = carve(memory, handles);
-        let (targets, memory) = carve(memory, handles);
-        let (positions, memory) = carve(memory, handles);
-        let (trial_positions, memory) = carve(memory, handles);
-        let (pulls, memory) = carve(memory, handles * sections.groups);
-        let (features, memory) = carve(memory, sections.groups);
-        let (held_sums, memory) = carve(memory, handles.div_ceil(TOGETHER));
-        let (derivative_sums, memory) = carve(memory, components);
-        let (shares, memory) = carve(memory, components);
-        let (pinned, memory) = carve(memory, components);
-        let (is_free, memory) = carve(memory, components);
-        let (evaluated, memory) = carve(memory, components);
-        let (start, memory) = carve(memory, components);
-        let (trial, memory) = carve(memory, components);
-        let (offsets, memory) = carve(memory, components);
-        let (lower, memory) = carve(memory, components);
-        let (upper, memory) = carve(memory, components);
-        let (jacobian, memory) = carve(memory, rows * components);
-        let (gram, memory) = carve(memory, rows * rows);
-        let (residual, memory) = carve(memory, rows);
-        let (multipliers, _) = carve(memory, rows);
+        let layout = HandlesLayout::for_basis(basis, capacity);
+        let mut carver = Carver::carving(memory, layout.size_bytes)?;
+        let handles = Self::carve(basis, capacity, &mut carver);
+        shares_at_rest(basis, handles.shares);
         Ok(Self {
-            basis_id: basis.id(),
-            count: 0,
             diagonal: diagonal(basis.rest_positions()),
+            ..handles
+        })
+    }
+
+    /// The sections in the order in which they lie in memory; all are zero.
+    fn carve(basis: &Basis<'_>, capacity: usize, carver: &mut Carver<'h>) -> Self {
+        let capacity = capacity.min(HANDLES_MAX);
+        let (groups, components) = (basis.vertex_count().div_ceil(GROUP_NODES), basis.component_count());
+        // Three rows of the small system a handle.
+        let rows = 3 * capacity;
+        Self {
+            basis: basis.identity(),
+            count: 0,
+            diagonal: 1.0,
             caution: 1.0,
             is_evaluated: false,
-            vertices,
-            targets,
-            positions,
-            trial_positions,
-            pulls,
-            features,
-            held_sums,
-            derivative_sums,
-            shares,
+            is_started: false,
+            vertices: carver.take(capacity),
+            targets: carver.take(capacity),
+            positions: carver.take(capacity),
+            trial_positions: carver.take(capacity),
+            pulls: carver.take(capacity.saturating_mul(groups)),
+            features: carver.take(groups),
+            held_sums: carver.take(capacity.div_ceil(TOGETHER)),
+            derivative_sums: carver.take(components),
+            shares: carver.take(components),
             memory: Memory {
-                pinned,
-                is_free,
-                evaluated,
-                start,
-                trial,
-                offsets,
-                lower,
-                upper,
-                jacobian,
-                gram,
-                residual,
-                multipliers,
+                pinned: carver.take(components),
+                is_free: carver.take(components),
+                evaluated: carver.take(components),
+                start: carver.take(components),
+                trial: carver.take(components),
+                offsets: carver.take(components),
+                lower: carver.take(components),
+                upper: carver.take(components),
+                jacobian: carver.take(rows * components),
+                gram: carver.take(rows * rows),
+                residual: carver.take(rows),
+                multipliers: carver.take(rows),
+                inverse_ranges: carver.take(components),
+                projected: carver.take(Likely::factor_count(&basis.prior()).saturating_mul(rows)),
             },
-        })
+        }
     }
 
     /// Takes hold of a vertex where the workspace's pose has it: costs one solve, and every drag from now on a little. Its
@@ -233,7 +191,7 @@ impl<'h> Handles<'h> {
     /// [`HandleError::NoSuchVertex`], [`HandleError::AlreadyHeld`], [`HandleError::Full`].
     pub fn add(&mut self, basis: &Basis<'_>, workspace: &mut Workspace<'_>, vertex: usize) -> Result<(), HandleError> {
         self.check_basis(basis)?;
-        workspace.validate_exact(basis).map_err(HandleError::of_workspace)?;
+        let tier = workspace.validate_exact(basis).map_err(HandleError::of_workspace)?;
         let (vertex_count, capacity) = (basis.vertex_count(), self.vertices.len());
         if vertex >= vertex_count {
             return Err(HandleError::NoSuchVertex { vertex, vertex_count });
@@ -244,20 +202,21 @@ impl<'h> Handles<'h> {
         if self.count == capacity {
             return Err(HandleError::Full { capacity });
         }
-        let (lane, n) = (basis.lane_from_vertex()[vertex] as usize, self.count);
-        let solver = basis.orders().solver_from_lane[lane] as usize;
-        workspace.solution.fill([0.0; 4]);
-        workspace.solution[solver][0] = 1.0;
-        let tier = basis.exact();
-        substitute(workspace.kernels, &tier.factor(), workspace.solution.as_chunks_mut().0);
+        let (slot, n) = (basis.slot_from_vertex().at(vertex) as usize, self.count);
+        let solver = tier.solve.solver_from_slot.at(slot);
+        workspace.solution.fill(Quad::default());
+        put(workspace.solution, solver, [1.0, 0.0, 0.0]);
+        substitute(workspace.kernels, &tier, workspace.solution);
         let group_count = self.features.len();
         let own = &mut self.pulls[n * group_count..][..group_count];
-        pull(&tier.rings(), tier.rest_positions(), workspace.solution, own);
-        let (rest, moved) = (basis.rest_positions()[lane], workspace.displacement[solver]);
+        with_index!(vertex_count, I => pull(&Rings::<I>::of(&tier.solve), tier.rest, workspace.solution, own));
+        let (rest, moved) = (tier.rest[slot], place(workspace.displacement, solver));
+        let added = workspace.added.at(&basis.after(), slot);
         self.vertices[n] = vertex as u32;
-        self.targets[n] = core::array::from_fn(|c| rest[c] + moved[c]);
+        self.targets[n] = core::array::from_fn(|c| rest[c] + moved[c] + added[c]);
         self.count += 1;
         self.is_evaluated = false;
+        self.is_started = false;
         Ok(())
     }
 
@@ -274,6 +233,7 @@ impl<'h> Handles<'h> {
         let (first, last) = ((n + 1) * group_count, (self.count + 1) * group_count);
         self.pulls.copy_within(first..last, n * group_count);
         self.is_evaluated = false;
+        self.is_started = false;
         Ok(())
     }
 
@@ -281,6 +241,7 @@ impl<'h> Handles<'h> {
     pub fn clear(&mut self) {
         self.count = 0;
         self.is_evaluated = false;
+        self.is_started = false;
     }
 
     /// Says where a held vertex should go; the next [`Drag`] moves it there. Units of the source.
@@ -307,6 +268,8 @@ impl<'h> Handles<'h> {
             component_count,
         };
         *self.memory.pinned.get_mut(component).ok_or(no_such)? = u32::from(is_pinned);
+        // It stays where it is now, not where it was.
+        self.is_started = false;
         Ok(())
     }
 
@@ -344,7 +307,7 @@ impl<'h> Handles<'h> {
     }
 
     fn check_basis(&self, basis: &Basis<'_>) -> Result<(), HandleError> {
-        if self.basis_id == basis.id() {
+        if self.basis == basis.identity() {
             Ok(())
         } else {
             Err(HandleError::ForeignHandles)

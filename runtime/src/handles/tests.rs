@@ -101,8 +101,9 @@ fn held_vertices_and_their_derivatives_are_those_of_the_frame() {
         }
         let positions = pose(&basis, &weights, &mut workspace);
         handles.memory.trial.copy_from_slice(&weights);
-        assert!(handles.evaluate(&basis, &workspace));
-        handles.linearise(&basis, &workspace);
+        let tier = basis.exact().unwrap();
+        assert!(handles.evaluate(&basis, &tier, &workspace));
+        handles.linearise(&basis, &tier, &workspace);
         for (n, &vertex) in vertices.iter().enumerate() {
             let apart = distance(&handles.trial_positions[n], &positions[vertex]);
             assert!(apart < TOLERANCE, "vertex {vertex} is {apart} away");
@@ -154,6 +155,31 @@ fn a_drag_reaches_what_can_be_reached() {
         );
         // Nothing is worse after an update than before.
         assert!(updates.windows(2).all(|pair| pair[1].1.misfit <= pair[0].1.misfit));
+    }
+}
+
+#[test]
+fn weights_that_go_together_are_dragged_together() {
+    let package = Package::small_with_prior(2);
+    let basis = open(&package);
+    let mut memory = memory_for(&basis);
+    let mut workspace = workspace_in(&basis, &mut memory);
+    // As far as two components go, seen through a single vertex: three coordinates for five weights.
+    let goal = pose(&basis, &[0.0, 0.0, 0.4, -0.4, 0.0], &mut workspace);
+    let vertex = 29;
+    let known = drag(&basis, &[(vertex, goal[vertex])], &[], &REST, 20);
+    let plain = Package::small_with_nothing_added(2);
+    let alike = drag(&open(&plain), &[(vertex, goal[vertex])], &[], &REST, 20);
+    let together = |updates: &[(Vec<f32>, DragReport)]| {
+        let weights = &updates.last().unwrap().0;
+        let all: f32 = weights.iter().map(|w| w * w).sum();
+        (weights[2] - weights[3]).powi(2) / (2.0 * all)
+    };
+    assert!(together(&known) > 0.9, "{:?}", known.last());
+    assert!(together(&alike) < 0.7, "{:?}", alike.last());
+    // One vertex tells both.
+    for (found, goal) in known.last().unwrap().0.iter().zip([0.0, 0.0, 0.4, -0.4, 0.0]) {
+        assert!((found - goal).abs() < 0.01, "{:?}", known.last());
     }
 }
 
@@ -244,6 +270,30 @@ fn without_handles_or_at_the_target_nothing_moves() {
             assert!(report.misfit == 0.0 && report.step_count == 0);
         }
     }
+}
+
+#[test]
+fn a_drag_without_handles_decodes_nothing() {
+    let package = Package::small(1);
+    let basis = open(&package);
+    let (mut memory, mut held) = (memory_for(&basis), handles_memory(&basis, 1));
+    let mut workspace = workspace_in(&basis, &mut memory);
+    let mut handles = Handles::new(&basis, 1, &mut held).unwrap();
+    let mut weights = [0.0; Package::COMPONENTS];
+    let mut controls = controls_at(&basis, &WEIGHTS, &mut weights);
+    let job = Drag {
+        basis: &basis,
+        handles: &mut handles,
+        controls: &mut controls,
+    };
+    assert_eq!(
+        job.run(&mut workspace),
+        Ok(DragReport {
+            misfit: 0.0,
+            step_count: 0
+        })
+    );
+    assert!(!handles.is_evaluated);
 }
 
 #[test]
@@ -367,11 +417,11 @@ fn validity() {
 }
 
 #[test]
-fn a_workspace_of_the_fast_tier_is_refused() {
-    let package = Package::small_with_fast_tier(1);
+fn a_workspace_of_bones_is_refused() {
+    let package = Package::small_with_bones(1);
     let basis = open(&package);
     let mut bytes = vec![0; 200_000];
-    let made = Workspace::for_tier(&basis, TierChoice::Fast, &mut bytes, Kernels::Scalar);
+    let made = Workspace::for_tier(&basis, TierChoice::Bones, &mut bytes, Kernels::Scalar);
     let mut workspace = made.unwrap();
     let mut bytes = vec![0; HandlesLayout::for_basis(&basis, 2).unaligned_bytes()];
     let mut handles = Handles::new(&basis, 2, &mut bytes).unwrap();

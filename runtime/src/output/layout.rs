@@ -38,6 +38,9 @@ pub enum UnitEncoding {
     Snorm16,
     /// Four i8, 127 for 1: a normal's fourth is 0 (4 bytes).
     Snorm8,
+    /// Two u16, 65535 for 1: the place on an unfolded octahedron, as Godot has it (4 bytes). A tangent's second number holds the
+    /// sign, too: in its upper half plus, in its lower half, turned over, minus.
+    Octahedral16,
 }
 
 /// Where an attribute lies: element r begins at byte `offset_bytes + r * stride_bytes`. No alignment is asked for.
@@ -83,7 +86,7 @@ impl VertexLayout {
             (AttributeName::Normals, UnitEncoding::Float32) => 12,
             (AttributeName::Tangents, UnitEncoding::Float32) => 16,
             (_, UnitEncoding::Snorm16) => 8,
-            (_, UnitEncoding::Snorm8) => 4,
+            (_, UnitEncoding::Snorm8 | UnitEncoding::Octahedral16) => 4,
         }
     }
 
@@ -184,7 +187,12 @@ mod tests {
     fn what_passes_is_sound_and_usual_layouts_pass() {
         const COUNT: usize = 5;
         let (mut passed, mut refused) = (0, 0);
-        for encoding in [UnitEncoding::Float32, UnitEncoding::Snorm16, UnitEncoding::Snorm8] {
+        for encoding in [
+            UnitEncoding::Float32,
+            UnitEncoding::Snorm16,
+            UnitEncoding::Snorm8,
+            UnitEncoding::Octahedral16,
+        ] {
             for offset in 0..80 {
                 for (one, other) in [(12, 12), (24, 24), (28, 28), (32, 32), (24, 32)] {
                     for buffer_bytes in [60, 130, 160, 400] {

@@ -1,9 +1,10 @@
 //! Output for engines: a frame's positions, normals and tangents as the bytes of a vertex buffer, so that an upload is one copy.
 //!
 //! Path of data: positions and normals of a [`crate::Frame`] `[V]` -> one element a render vertex `[R]` -> the caller's bytes.
-//! Engines split a vertex where texture coordinates do (a seam); [`Basis::render_mesh`] has those render vertices and their
-//! triangles. A package without texture coordinates has R = V, in source order, and [`Basis::faces`] are the triangles.
+//! Engines split a vertex where texture coordinates do (a seam); [`Basis::surface`] has those render vertices and their
+//! triangles. A package without texture coordinates has R = V, in slots.
 
+mod encode;
 mod error;
 mod layout;
 mod tangents;
@@ -12,9 +13,9 @@ pub use error::OutputError;
 pub use layout::{Attribute, AttributeName, UnitEncoding, VertexLayout};
 
 use crate::basis::Basis;
-use crate::error::Buffer;
-use crate::normals::check_length;
-use crate::simd::scalar::surface::Bounds;
+use crate::error::{Buffer, check_length};
+use crate::positions::Bounds;
+use encode::{octahedral16, octahedral16_signed, snorm8, snorm16};
 
 /// Writes the vertices of a frame into a vertex buffer. For buffers in separate memory run it once for each.
 ///
@@ -53,9 +54,10 @@ impl VertexOutput<'_> {
     /// # Errors
     /// Every [`OutputError`].
     pub fn validate(&self) -> Result<(), OutputError> {
-        check_length(self.basis, Buffer::Positions, self.positions.len()).map_err(OutputError::Input)?;
+        let count = self.basis.vertex_count();
+        check_length(count, Buffer::Positions, self.positions.len()).map_err(OutputError::Input)?;
         if let Some(normals) = self.normals {
-            check_length(self.basis, Buffer::Normals, normals.len()).map_err(OutputError::Input)?;
+            check_length(count, Buffer::Normals, normals.len()).map_err(OutputError::Input)?;
         }
         let layout = &self.layout;
         for (at, attribute) in [
@@ -70,7 +72,7 @@ impl VertexOutput<'_> {
             (layout.tangents, AttributeName::Tangents),
             (layout.texture_coordinates, AttributeName::TextureCoordinates),
         ] {
-            if at.is_some() && self.basis.render_mesh().vertices.is_empty() {
+            if at.is_some() && !self.basis.surface().has_texture() {
                 return Err(OutputError::NoTexture { attribute });
             }
         }
@@ -95,35 +97,35 @@ impl VertexOutput<'_> {
             layout,
             bytes,
         } = self;
-        let render = basis.render_mesh();
+        let vertices = || basis.render_vertices().map(|v| v as usize);
         if let Some(at) = layout.positions {
-            spread(bytes, at, render.vertices, positions, |p| {
-                bytemuck::cast::<_, [u8; 12]>(*p)
-            });
+            spread(bytes, at, vertices(), positions, |p| bytemuck::cast::<_, [u8; 12]>(*p));
         }
         if let (Some(at), Some(normals)) = (layout.normals, normals) {
             let four = |n: &[f32; 3]| [n[0], n[1], n[2], 0.0];
             match layout.encoding {
                 UnitEncoding::Float32 => {
-                    spread(bytes, at, render.vertices, normals, |n| {
-                        bytemuck::cast::<_, [u8; 12]>(*n)
-                    });
+                    spread(bytes, at, vertices(), normals, |n| bytemuck::cast::<_, [u8; 12]>(*n));
                 }
-                UnitEncoding::Snorm16 => spread(bytes, at, render.vertices, normals, |n| snorm16(&four(n))),
-                UnitEncoding::Snorm8 => spread(bytes, at, render.vertices, normals, |n| snorm8(&four(n))),
+                UnitEncoding::Snorm16 => spread(bytes, at, vertices(), normals, |n| snorm16(&four(n))),
+                UnitEncoding::Snorm8 => spread(bytes, at, vertices(), normals, |n| snorm8(&four(n))),
+                UnitEncoding::Octahedral16 => spread(bytes, at, vertices(), normals, octahedral16),
             }
         }
         if let (Some(at), Some(normals)) = (layout.tangents, normals) {
-            let tangents = &mut scratch[..render.vertices.len()];
+            let tangents = &mut scratch[..basis.render_vertex_count()];
             tangents::tangents(basis, positions, normals, tangents);
             match layout.encoding {
-                UnitEncoding::Float32 => spread(bytes, at, &[], tangents, |t| bytemuck::cast::<_, [u8; 16]>(*t)),
-                UnitEncoding::Snorm16 => spread(bytes, at, &[], tangents, snorm16),
-                UnitEncoding::Snorm8 => spread(bytes, at, &[], tangents, snorm8),
+                UnitEncoding::Float32 => spread(bytes, at, 0.., tangents, |t| bytemuck::cast::<_, [u8; 16]>(*t)),
+                UnitEncoding::Snorm16 => spread(bytes, at, 0.., tangents, snorm16),
+                UnitEncoding::Snorm8 => spread(bytes, at, 0.., tangents, snorm8),
+                UnitEncoding::Octahedral16 => spread(bytes, at, 0.., tangents, octahedral16_signed),
             }
         }
         if let Some(at) = layout.texture_coordinates {
-            spread(bytes, at, &[], render.uvs, |uv| bytemuck::cast::<_, [u8; 8]>(*uv));
+            spread(bytes, at, 0.., basis.surface().uvs, |uv| {
+                bytemuck::cast::<_, [u8; 8]>(*uv)
+            });
         }
         let mut bounds = Bounds::EMPTY;
         positions.iter().for_each(|p| bounds.include(p));
@@ -131,32 +133,18 @@ impl VertexOutput<'_> {
     }
 }
 
-/// Writes one element for each index, or for each source where there are no indices.
+/// Writes one element for each index, as far as there are elements.
 fn spread<T, const N: usize>(
     bytes: &mut [u8],
     at: Attribute,
-    indices: &[u32],
+    indices: impl Iterator<Item = usize>,
     source: &[T],
     encode: impl Fn(&T) -> [u8; N],
 ) {
     let places = bytes[at.offset_bytes..].chunks_mut(at.stride_bytes);
-    if indices.is_empty() {
-        for (place, element) in places.zip(source) {
-            place[..N].copy_from_slice(&encode(element));
-        }
-    } else {
-        for (place, &v) in places.zip(indices) {
-            place[..N].copy_from_slice(&encode(&source[v as usize]));
-        }
+    for (place, element) in places.zip(indices.map_while(|i| source.get(i))) {
+        place[..N].copy_from_slice(&encode(element));
     }
-}
-
-fn snorm16(v: &[f32; 4]) -> [u8; 8] {
-    bytemuck::cast(v.map(|x| libm::roundf(x.clamp(-1.0, 1.0) * 32767.0) as i16))
-}
-
-fn snorm8(v: &[f32; 4]) -> [u8; 4] {
-    bytemuck::cast(v.map(|x| libm::roundf(x.clamp(-1.0, 1.0) * 127.0) as i8))
 }
 
 #[cfg(test)]

@@ -13,13 +13,13 @@ use crate::basis::Basis;
 /// Fills `tangents`. Shape: `positions` and `normals` `[V]`, source order; `tangents` `[R]`. Where a vertex' triangles say nothing
 /// (no area, or none in the texture) its tangent is some unit vector perpendicular to the normal.
 pub(super) fn tangents(basis: &Basis<'_>, positions: &[[f32; 3]], normals: &[[f32; 3]], tangents: &mut [[f32; 4]]) {
-    let render = basis.render_mesh();
+    let surface = basis.surface();
     tangents.fill([0.0; 4]);
-    for (face, corners) in basis.faces().iter().zip(render.faces) {
+    for (face, corners) in basis.faces().iter().zip(surface.drawn_faces().iter()) {
         let p = face.map(|v| positions[v as usize]);
-        let uv = corners.map(|r| render.uvs[r as usize]);
+        let uv = corners.map(|r| surface.uvs[r as usize]);
         if let Some(share) = of_triangle(&p, &uv) {
-            for &r in corners {
+            for r in corners {
                 let sum = &mut tangents[r as usize];
                 for c in 0..4 {
                     sum[c] += share[c];
@@ -27,7 +27,7 @@ pub(super) fn tangents(basis: &Basis<'_>, positions: &[[f32; 3]], normals: &[[f3
             }
         }
     }
-    for (tangent, &v) in tangents.iter_mut().zip(render.vertices) {
+    for (tangent, v) in tangents.iter_mut().zip(basis.render_vertices()) {
         *tangent = settled(tangent, &normals[v as usize]);
     }
 }

@@ -77,7 +77,7 @@ fn interleaved_and_separate_buffers_hold_the_frame() {
     let package = torn();
     let basis = Basis::open(&package).unwrap();
     let frame = frame(&basis, 0.6);
-    let (render, count) = (basis.render_mesh(), basis.render_vertex_count());
+    let (surface, count) = (basis.surface(), basis.render_vertex_count());
     assert!(count > basis.vertex_count());
     // 3 bytes in front, 50 a vertex of which 2 belong to nothing.
     let interleaved = VertexLayout {
@@ -97,10 +97,10 @@ fn interleaved_and_separate_buffers_hold_the_frame() {
     for (layout, length) in [(interleaved, 53 + 50 * count), (separate, 48 * count)] {
         let mut bytes = vec![UNTOUCHED; length];
         write(&basis, &frame, layout, &mut bytes);
-        for (r, &v) in render.vertices.iter().enumerate() {
+        for (r, v) in basis.render_vertices().enumerate() {
             assert_eq!(floats::<3>(&bytes, layout.positions, r), frame[0][v as usize]);
             assert_eq!(floats::<3>(&bytes, layout.normals, r), frame[1][v as usize]);
-            assert_eq!(floats::<2>(&bytes, layout.texture_coordinates, r), render.uvs[r]);
+            assert_eq!(floats::<2>(&bytes, layout.texture_coordinates, r), surface.uvs[r]);
         }
         if layout == interleaved {
             let gaps = (0..count).map(|r| &bytes[3 + 50 * r + 24..][..2]);
@@ -113,7 +113,6 @@ fn interleaved_and_separate_buffers_hold_the_frame() {
 fn tangents_follow_the_texture_and_say_where_it_is_mirrored() {
     let package = torn();
     let basis = Basis::open(&package).unwrap();
-    let render = basis.render_mesh();
     let layout = VertexLayout {
         tangents: at(0, 16),
         ..VertexLayout::default()
@@ -122,16 +121,17 @@ fn tangents_follow_the_texture_and_say_where_it_is_mirrored() {
         let frame = frame(&basis, weight);
         let mut bytes = vec![0; 16 * basis.render_vertex_count()];
         write(&basis, &frame, layout, &mut bytes);
-        for (r, &v) in render.vertices.iter().enumerate() {
+        for (r, v) in basis.render_vertices().enumerate() {
             let [x, y, z, sign] = floats(&bytes, layout.tangents, r);
             let n = frame[1][v as usize];
             assert!((x * x + y * y + z * z - 1.0).abs() < TOLERANCE);
             assert!((n[0] * x + n[1] * y + n[2] * z).abs() < TOLERANCE);
             // Left of the fold u grows with x, right of it against it.
-            let is_mirrored = render
-                .faces
+            let is_mirrored = basis
+                .surface()
+                .drawn_faces()
                 .iter()
-                .zip(basis.faces())
+                .zip(basis.faces().iter())
                 .any(|(corners, face)| corners.contains(&(r as u32)) && face.iter().any(|v| v % 3 == 2));
             assert_eq!(sign, if is_mirrored { -1.0 } else { 1.0 });
             assert!(x * sign > 0.5, "render vertex {r}: {x} {sign}");
@@ -183,7 +183,7 @@ fn integers_are_the_nearest() {
 }
 
 #[test]
-fn without_texture_the_vertices_are_the_render_vertices() {
+fn without_texture_the_render_vertices_are_the_slots() {
     let package = Package::small(1);
     let basis = open(&package);
     let frame = frame(&basis, 0.4);
@@ -195,8 +195,16 @@ fn without_texture_the_vertices_are_the_render_vertices() {
     let mut bytes = vec![0; 12 * basis.vertex_count()];
     let found = write(&basis, &frame, layout, &mut bytes);
     for (v, p) in frame[0].iter().enumerate() {
-        assert_eq!(floats::<3>(&bytes, layout.positions, v), *p);
+        let slot = basis.slot_from_vertex().at(v) as usize;
+        assert_eq!(floats::<3>(&bytes, layout.positions, slot), *p);
     }
+    let drawn = basis.surface().drawn_faces();
+    assert!(
+        drawn
+            .iter()
+            .flatten()
+            .all(|slot| (slot as usize) < basis.vertex_count())
+    );
     for c in 0..3 {
         let values = || frame[0].iter().map(|p| p[c]);
         assert_eq!(found.minimum[c], values().fold(f32::MAX, f32::min));

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use miette::{IntoDiagnostic, Report, WrapErr};
 use sinew_formats::package::save_package;
-use sinew_runtime::input::KnobCalibration;
+use sinew_knobs::KnobCalibration;
 
 use crate::config::keys::{Fault, Keys};
 use crate::config::{ConfigError, parse_toml};
@@ -28,8 +28,6 @@ pub struct CalibratedKnob {
 pub struct DeviceCalibration {
     /// The device.
     pub device: String,
-    /// Its supply sagged while it was measured.
-    pub follow_supply: bool,
     /// Its knobs.
     pub knobs: Vec<CalibratedKnob>,
 }
@@ -128,7 +126,6 @@ impl Calibrations {
         for device in &self.devices {
             // Writing to a string cannot fail.
             let _ = writeln!(text, "\n[[device]]\nid = {}", quoted(&device.device));
-            let _ = writeln!(text, "follow_supply = {}", device.follow_supply);
             for knob in &device.knobs {
                 let _ = writeln!(text, "\n[[device.knob]]\nknob = {}", knob.address);
                 if !knob.name.is_empty() {
@@ -168,7 +165,6 @@ fn parse(text: &str) -> Result<Calibrations, Fault> {
         let id = device
             .text("id")?
             .ok_or_else(|| Fault::new(device.span.clone(), "[[device]] has no `id`"))?;
-        let follow_supply = device.flag("follow_supply")?.unwrap_or(false);
         let mut knobs = Vec::new();
         for knob in device.tables("knob", "[[device.knob]]")? {
             knobs.push(read_knob(knob)?);
@@ -176,7 +172,6 @@ fn parse(text: &str) -> Result<Calibrations, Fault> {
         device.finish()?;
         devices.push(DeviceCalibration {
             device: id.value.to_owned(),
-            follow_supply,
             knobs,
         });
     }
@@ -236,7 +231,6 @@ mod tests {
         };
         DeviceCalibration {
             device: id.to_owned(),
-            follow_supply: true,
             knobs: vec![knob(0, "", POT), knob(4, "jaw \"left\"", centred)],
         }
     }
@@ -271,6 +265,6 @@ mod tests {
         .text()
         .replace("highest = 1010", "highest = 9");
         let error = Calibrations::parse(Path::new("c.toml"), &text).unwrap_err();
-        assert_eq!(error.to_string(), "c.toml:7:1: these numbers leave no range to turn in");
+        assert_eq!(error.to_string(), "c.toml:6:1: these numbers leave no range to turn in");
     }
 }

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
-use sinew_formats::interchange::write_npy_matrix;
 use sinew_formats::package::save_package;
+use sinew_interchange::write_npy_matrix;
 
 /// Collects frames, then writes them.
 pub struct WeightsTable {

@@ -7,7 +7,8 @@ use sinew_stage::commands::{self, Failure};
 
 /// Performs Sinew packages live: a knob box, a phone or a script moves the mesh.
 ///
-/// A first look:    sinew-stage play model.sinew
+/// A first look:    sinew-stage play --demo --page    (open http://127.0.0.1:8080 and drag)
+/// Your package:    sinew-stage play model.sinew --page
 /// Without a box:   sinew-stage knobs simulate        (in another terminal; it says what to play)
 /// Your box:        sinew-stage knobs list
 ///                  sinew-stage knobs calibrate       turn every knob once

@@ -3,7 +3,7 @@
 use core::time::Duration;
 use std::thread;
 
-use sinew_runtime::input::Clock;
+use sinew_knobs::device::Clock;
 
 /// When frames are due.
 #[derive(Debug, Clone, Copy)]

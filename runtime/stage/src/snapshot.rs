@@ -1,11 +1,16 @@
 //! What a performance shows: filled by the frame loop, read by the terminal view and the status lines. The frame never waits
 //! for a reader: a snapshot that is being read stays as it was for one frame.
 
+use core::fmt;
 use core::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
+use sinew_knobs::device::DeviceStatus;
+use sinew_knobs::{Assignment, Command, ControlSurface, Knob, SurfaceStatus, TreeView};
 use sinew_runtime::Basis;
-use sinew_runtime::input::{Assignment, Command, ControlSurface, DeviceStatus, Knob, SurfaceStatus, TreeView};
+
+/// Requests that wait at most, and that a frame takes at most: who asks more waits or is refused, and no flood of them holds a frame.
+pub const REQUESTS_MAX: usize = 4096;
 
 /// What somebody wants of the frame loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,14 +19,14 @@ pub enum Request {
     Command(Command),
     /// Stop, or release if stopped.
     StopOrRelease,
-    /// A weight, past the knobs.
+    /// A weight, past the knobs: the control goes there in a fraction of a second, no faster than its slew limit.
     Weight {
         /// Index of the component.
         control: u16,
         /// Clamped to its range.
         weight: f32,
     },
-    /// All weights to rest at once.
+    /// Everything eases to rest, and goes on from there.
     Rest,
     /// Begin to record, or end it.
     Record,
@@ -136,10 +141,19 @@ pub struct Snapshot {
 }
 
 /// Where the frame loop leaves its snapshot.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub struct Board {
     snapshot: Mutex<Snapshot>,
     over: AtomicBool,
+    wake: OnceLock<Box<dyn Fn() + Send + Sync>>,
+}
+
+impl fmt::Debug for Board {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.debug_struct("Board")
+            .field("snapshot", &self.snapshot)
+            .finish_non_exhaustive()
+    }
 }
 
 impl Board {
@@ -153,7 +167,7 @@ impl Board {
         };
         Self {
             snapshot: Mutex::new(snapshot),
-            over: AtomicBool::new(false),
+            ..Self::default()
         }
     }
 
@@ -161,6 +175,19 @@ impl Board {
     pub fn publish(&self, change: impl FnOnce(&mut Snapshot)) {
         if let Ok(mut snapshot) = self.snapshot.try_lock() {
             change(&mut snapshot);
+        }
+        self.wake();
+    }
+
+    /// Calls `wake` after every change from now on. It must neither wait nor take long. Only the first caller is heard.
+    pub fn on_publish(&self, wake: impl Fn() + Send + Sync + 'static) {
+        let _ = self.wake.set(Box::new(wake));
+    }
+
+    /// Does what a change would, without one.
+    pub fn wake(&self) {
+        if let Some(wake) = self.wake.get() {
+            wake();
         }
     }
 

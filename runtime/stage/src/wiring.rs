@@ -4,10 +4,11 @@
 mod resolve;
 mod split;
 
-use sinew_runtime::Basis;
-use sinew_runtime::input::{
-    Binding, Button, ControlMap, Knob, KnobCalibration, MapError, Smoothing, SurfaceSettings, TreePages,
+use sinew_knobs::{
+    Binding, Button, ControlMap, Knob, KnobCalibration, KnobEvent, MapError, Reading, Smoothing, SurfaceSettings,
+    TreePages,
 };
+use sinew_runtime::Basis;
 
 use crate::config::Place;
 pub use resolve::{resolve, unknown_component};
@@ -35,6 +36,8 @@ pub struct WiredKnob {
     pub smoothing: Smoothing,
     /// Travel of an encoder's step.
     pub step: f32,
+    /// How many times further a step goes when the encoder is spun.
+    pub acceleration: f32,
 }
 
 /// Everything that a map borrows.
@@ -63,6 +66,7 @@ impl Wiring {
             calibration: knob.calibration,
             smoothing: knob.smoothing,
             step: knob.step,
+            acceleration: knob.acceleration,
         });
         knobs.collect()
     }
@@ -116,15 +120,13 @@ impl Routes {
     }
 }
 
-/// Routes at work: looks each address up once.
+/// Routes at work: one look at a table an event.
 #[derive(Debug)]
 pub struct Router {
     routes: Routes,
     taken: usize,
     /// Indexed by the device's address.
     table: Vec<u16>,
-    /// Addresses without a place in the map, which a name that comes later may give one.
-    unplaced: Vec<u16>,
 }
 
 /// Not looked up yet. A device's address that the map lacks stays what it is.
@@ -137,52 +139,40 @@ impl Router {
             routes,
             taken: 0,
             table: vec![UNSEEN; usize::from(u16::MAX) + 1],
-            unplaced: Vec::with_capacity(64),
         }
     }
 
-    /// Address in the map; `name_of` asks the device what it calls a knob, once for each knob.
-    pub fn route(&mut self, address: u16, name_of: impl FnOnce(u16) -> Option<String>) -> u16 {
+    /// The device calls a knob so: the map may know it by that name, however it was taken before.
+    pub fn name(&mut self, address: u16, name: &str) {
+        let named = self.routes.named.iter().find(|(known, _)| known == name);
+        if let Some((_, own)) = named {
+            self.table[usize::from(address)] = *own;
+        }
+    }
+
+    /// Address in the map. A knob that comes without being expected takes a place of its own once it has been turned: what only
+    /// goes from one end to the other is a button, or half of a pair.
+    pub fn route(&mut self, event: KnobEvent) -> u16 {
+        let address = event.knob;
         let known = self.table[usize::from(address)];
         if known != UNSEEN {
             return known;
         }
-        let routed = self.place(address, name_of(address).as_deref());
-        self.table[usize::from(address)] = routed;
-        if routed == address && !self.routes.same.contains(&address) && self.unplaced.len() < self.unplaced.capacity() {
-            self.unplaced.push(address);
-        }
-        routed
-    }
-
-    fn place(&mut self, address: u16, name: Option<&str>) -> u16 {
-        let named = self.routes.named.iter().find(|(known, _)| Some(known.as_str()) == name);
-        if let Some((_, own)) = named {
-            return *own;
-        }
-        if self.routes.same.contains(&address) {
-            return address;
-        }
-        match self.routes.free.get(self.taken) {
-            Some(free) => {
+        let is_turned = match event.reading {
+            Reading::Position { value, full_scale } => value > 0 && value < full_scale,
+            Reading::Steps(_) => true,
+        };
+        let routed = match self.routes.free.get(self.taken) {
+            _ if self.routes.same.contains(&address) => address,
+            Some(_) if !is_turned => return address,
+            Some(&free) => {
                 self.taken += 1;
-                *free
+                free
             }
             None => address,
-        }
-    }
-
-    /// Looks again at addresses without a place: names may have come since. About once a second.
-    pub fn refresh(&mut self, name_of: impl Fn(u16) -> Option<String>) {
-        let (routes, table) = (&self.routes, &mut self.table);
-        self.unplaced.retain(|&address| {
-            let name = name_of(address);
-            let named = routes.named.iter().find(|(known, _)| Some(known) == name.as_ref());
-            if let Some((_, own)) = named {
-                table[usize::from(address)] = *own;
-            }
-            named.is_none()
-        });
+        };
+        self.table[usize::from(address)] = routed;
+        routed
     }
 }
 

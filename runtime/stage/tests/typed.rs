@@ -6,9 +6,9 @@ use core::time::Duration;
 use std::io::Write;
 
 use common::{Ran, Stage, table};
-use sinew_formats::interchange::read_sequence;
 use sinew_formats::package::fixture::tiny_compact;
 use sinew_formats::package::{save_package, write_compact};
+use sinew_interchange::{Choice, read_sequence};
 
 #[test]
 fn typed_lines_move_the_mesh_and_the_take_gives_the_same_weights() {
@@ -61,7 +61,7 @@ fn frames_of_ones_own_are_even() {
     for (n, row) in rows.iter().enumerate() {
         assert!((row[0] - n as f32 / 24.0).abs() < 1e-4);
     }
-    let shapes = read_sequence(&stage.path("keys"), &mut |_, _| {})
+    let shapes = read_sequence(&stage.path("keys"), &Choice::default(), &mut |_, _| {})
         .unwrap()
         .sequence
         .shapes;
@@ -143,7 +143,7 @@ fn a_cut_take_is_played_as_far_as_it_goes() {
 #[test]
 fn a_recording_can_begin_and_end_while_it_plays() {
     let stage = Stage::new();
-    let mut child = stage.start("play model.sinew --typed --headless --for 1200ms");
+    let mut child = stage.start("play model.sinew --typed --headless --for 4s");
     let mut stdin = child.stdin.take().unwrap();
     for line in [
         "c0 0.3", "record", "c1 0.2", "record", "c2 0.1", "record", "rest", "stop",

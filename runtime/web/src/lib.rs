@@ -1,7 +1,7 @@
 //! Sinew's runtime in a browser or in node: plain functions over linear memory, without std, allocator or generated
 //! glue. `sinew.js` beside this crate is the JavaScript side.
 //!
-//! Path of data: package bytes at [`sinew_reserve`]'s address -> [`sinew_open`] -> [`sinew_set_control`] ->
+//! Path of data: package bytes at [`sinew_reserve`]'s address -> [`sinew_open`] -> [`sinew_set_control`] or [`sinew_drag`] ->
 //! [`sinew_frame`] -> positions and normals at fixed addresses, ready for a GPU upload. A module instance plays one
 //! package; a page that wants two makes two instances. Every function may be called at any time, in any order, with any
 //! number: what makes no sense is refused with a status and a sentence in [`sinew_message`].
@@ -14,7 +14,6 @@ mod player;
 
 use core::panic::PanicInfo;
 
-use sinew_checksum::Checksum;
 use sinew_runtime::FrameOutcome;
 
 use player::{Fault, Player, with_player};
@@ -91,7 +90,7 @@ pub extern "C" fn sinew_component_count() -> usize {
 /// Address of the triangles, u32 `[F][3]`, counter-clockwise; 0 when no package is open.
 #[unsafe(no_mangle)]
 pub extern "C" fn sinew_faces() -> usize {
-    ask(0, |player| Ok(player.basis.faces().as_ptr().addr()))
+    ask(0, |player| Ok(player.faces.as_ptr().addr()))
 }
 
 /// Address of the positions, f32 `[V][3]`, units of the source; 0 when no package is open.
@@ -146,11 +145,39 @@ pub extern "C" fn sinew_set_control(k: usize, weight: f32) -> f32 {
     ask(f32::NAN, |player| Ok(player.controls.set(k, weight)?))
 }
 
-/// Sets control `k` as a knob does that reads 0 at its lower stop and 1023 at its upper one. Returns like
-/// [`sinew_set_control`]; a reading above 1023 is refused.
+/// Sets control `k` by the share of its way from the lower stop, 0, to the upper one, 1. Returns like
+/// [`sinew_set_control`].
 #[unsafe(no_mangle)]
-pub extern "C" fn sinew_set_knob(k: usize, knob: u32) -> f32 {
-    ask(f32::NAN, |player| player.set_knob(k, knob))
+pub extern "C" fn sinew_set_share(k: usize, share: f32) -> f32 {
+    ask(f32::NAN, |player| Ok(player.controls.set_share(k, share)?))
+}
+
+/// The weight of control `k`; NaN when there is none.
+#[unsafe(no_mangle)]
+pub extern "C" fn sinew_weight(k: usize) -> f32 {
+    ask(f32::NAN, |player| {
+        player.component(k)?;
+        Ok(player.controls.weights()[k])
+    })
+}
+
+/// Takes hold of a vertex, by its source index, where the last frame has it. Eight at most. Returns [`OK`] or [`REFUSED`].
+#[unsafe(no_mangle)]
+pub extern "C" fn sinew_hold(vertex: usize) -> i32 {
+    status(with_player(|player| player.hold(vertex).map(|()| OK)))
+}
+
+/// Lets go of a held vertex. Returns [`OK`] or [`REFUSED`].
+#[unsafe(no_mangle)]
+pub extern "C" fn sinew_let_go(vertex: usize) -> i32 {
+    status(with_player(|player| player.let_go(vertex).map(|()| OK)))
+}
+
+/// Moves the controls so that a held vertex comes to a point, units of the source, and the other held ones stay, as well as the
+/// components allow; run [`sinew_frame`] afterwards. Returns [`OK`] or [`REFUSED`]; then nothing moved.
+#[unsafe(no_mangle)]
+pub extern "C" fn sinew_drag(vertex: usize, x: f32, y: f32, z: f32) -> i32 {
+    status(with_player(|player| player.drag(vertex, [x, y, z]).map(|()| OK)))
 }
 
 /// All controls to rest. Returns [`OK`] or [`REFUSED`].
@@ -172,21 +199,6 @@ pub extern "C" fn sinew_frame() -> i32 {
             FrameOutcome::Unchanged => UNCHANGED,
         })
     }))
-}
-
-/// FNV-1a over the bits of positions, then normals, going on from `checksum`: to compare frames with other targets.
-/// Begin with [`sinew_checksum_start`].
-#[unsafe(no_mangle)]
-pub extern "C" fn sinew_checksum(checksum: u64) -> u64 {
-    ask(checksum, |player| {
-        Ok(Checksum(checksum).with(player.positions).with(player.normals).0)
-    })
-}
-
-/// What the first call of [`sinew_checksum`] goes on from.
-#[unsafe(no_mangle)]
-pub extern "C" fn sinew_checksum_start() -> u64 {
-    Checksum::START.0
 }
 
 #[panic_handler]

@@ -1,7 +1,7 @@
 //! Linear memory beyond the module's own data: one arena, taken from its start again for every package.
 
 use core::arch::wasm32::{memory_grow, memory_size};
-use core::slice;
+use core::{ptr, slice};
 
 /// Bytes a page of WebAssembly.
 const PAGE_BYTES: usize = 64 * 1024;
@@ -29,8 +29,8 @@ impl Arena {
         }
     }
 
-    /// `count` zeroed elements at a multiple of 64, or none when memory cannot grow that far.
-    pub(crate) fn take<T: Plain>(&mut self, count: usize) -> Option<&'static mut [T]> {
+    /// Room for `count` elements at a multiple of 64: its address, or none when memory cannot grow that far.
+    pub(crate) fn reserve<T: Plain>(&mut self, count: usize) -> Option<usize> {
         let start = self.next.checked_next_multiple_of(ALIGNMENT)?;
         let end = start.checked_add(count.checked_mul(size_of::<T>())?)?;
         let pages = end.div_ceil(PAGE_BYTES);
@@ -39,9 +39,14 @@ impl Arena {
             return None;
         }
         self.next = end;
-        let first = (&raw const __heap_base).cast_mut().with_addr(start).cast::<T>();
-        // SAFETY: the bytes are inside linear memory (just grown to `end`), beyond data and stack, handed out once by this
-        // arena, aligned to 64, and zeroed, which is a value of every `Plain` type.
+        Some(start)
+    }
+
+    /// `count` zeroed elements at a multiple of 64, or none when memory cannot grow that far.
+    pub(crate) fn take<T: Plain>(&mut self, count: usize) -> Option<&'static mut [T]> {
+        let first = ptr::with_exposed_provenance_mut::<T>(self.reserve::<T>(count)?);
+        // SAFETY: the bytes are inside linear memory, beyond data and stack, handed out once by this arena, aligned to 64, and
+        // zeroed, which is a value of every `Plain` type.
         Some(unsafe {
             first.write_bytes(0, count);
             slice::from_raw_parts_mut(first, count)
@@ -61,3 +66,5 @@ unsafe impl Plain for u8 {}
 unsafe impl Plain for f32 {}
 // SAFETY: three floats.
 unsafe impl Plain for [f32; 3] {}
+// SAFETY: three whole numbers.
+unsafe impl Plain for [u32; 3] {}

@@ -3,24 +3,26 @@
 use core::cell::UnsafeCell;
 use core::fmt;
 
-use sinew_checksum::{FULL_SCALE, weight};
 use sinew_runtime::{
-    Basis, Component, ControlError, Controls, Frame, FrameError, FrameOutcome, OpenError, Workspace, WorkspaceError,
-    WorkspaceLayout,
+    Basis, Component, ControlError, Controls, Drag, Frame, FrameError, FrameOutcome, HandleError, Handles,
+    HandlesLayout, OpenError, Workspace, WorkspaceError, WorkspaceLayout,
 };
 
 use crate::memory::Arena;
+
+/// Vertices that can be held at once: two hands and some pins.
+const HELD_MAX: usize = 8;
 
 /// Why a call refused.
 pub(crate) enum Fault {
     NothingReserved,
     NothingOpen,
     OutOfMemory,
-    KnobAboveFullScale(u32),
     Open(OpenError),
     Workspace(WorkspaceError),
     Control(ControlError),
     Frame(FrameError),
+    Held(HandleError),
 }
 
 impl fmt::Display for Fault {
@@ -29,11 +31,11 @@ impl fmt::Display for Fault {
             Self::NothingReserved => out.write_str("no room was reserved for a package"),
             Self::NothingOpen => out.write_str("no package is open"),
             Self::OutOfMemory => out.write_str("the browser has no memory left for this package"),
-            Self::KnobAboveFullScale(knob) => write!(out, "a knob reads {knob}, more than {FULL_SCALE}"),
             Self::Open(error) => error.fmt(out),
             Self::Workspace(error) => error.fmt(out),
             Self::Control(error) => error.fmt(out),
             Self::Frame(error) => error.fmt(out),
+            Self::Held(error) => error.fmt(out),
         }
     }
 }
@@ -50,15 +52,26 @@ impl From<FrameError> for Fault {
     }
 }
 
+impl From<HandleError> for Fault {
+    fn from(error: HandleError) -> Self {
+        Self::Held(error)
+    }
+}
+
 /// A package being played. Everything lies in the arena or in the slot below.
 pub(crate) struct Player {
     pub(crate) basis: &'static Basis<'static>,
     pub(crate) controls: Controls<'static>,
+    held: Handles<'static>,
     workspace: Workspace<'static>,
+    /// Shape: `[F]`, source order.
+    pub(crate) faces: &'static [[u32; 3]],
     /// Shape: `[V]`, source order.
     pub(crate) positions: &'static mut [[f32; 3]],
     /// Shape: `[V]`, source order.
     pub(crate) normals: &'static mut [[f32; 3]],
+    /// Whether positions and normals are those of the workspace's pose.
+    is_drawn: bool,
 }
 
 impl Player {
@@ -75,13 +88,6 @@ impl Player {
         }
     }
 
-    pub(crate) fn set_knob(&mut self, k: usize, knob: u32) -> Result<f32, Fault> {
-        let component = self.component(k)?;
-        let reading = u16::try_from(knob).ok().filter(|&knob| knob <= FULL_SCALE);
-        let reading = reading.ok_or(Fault::KnobAboveFullScale(knob))?;
-        Ok(self.controls.set(k, weight(&component, reading))?)
-    }
-
     pub(crate) fn frame(&mut self) -> Result<FrameOutcome, Fault> {
         let job = Frame {
             basis: self.basis,
@@ -89,15 +95,39 @@ impl Player {
             positions: self.positions,
             normals: Some(self.normals),
         };
+        if self.is_drawn && !job.would_change(&self.workspace) {
+            return Ok(FrameOutcome::Unchanged);
+        }
+        self.is_drawn = true;
         Ok(job.run(&mut self.workspace)?)
+    }
+
+    pub(crate) fn hold(&mut self, vertex: usize) -> Result<(), Fault> {
+        Ok(self.held.add(self.basis, &mut self.workspace, vertex)?)
+    }
+
+    pub(crate) fn let_go(&mut self, vertex: usize) -> Result<(), Fault> {
+        Ok(self.held.remove(vertex)?)
+    }
+
+    pub(crate) fn drag(&mut self, vertex: usize, target: [f32; 3]) -> Result<(), Fault> {
+        self.held.set_target(vertex, target)?;
+        let job = Drag {
+            basis: self.basis,
+            handles: &mut self.held,
+            controls: &mut self.controls,
+        };
+        job.run(&mut self.workspace)?;
+        Ok(())
     }
 }
 
 /// What an instance keeps, beside the basis that the player borrows.
 struct State {
     player: Option<Player>,
-    /// Where the package goes, until it is opened, and the rest of the arena.
-    reserved: Option<(&'static mut [u8], Arena)>,
+    /// Where the package goes and how long it is, until it is opened, and the rest of the arena. No reference to the bytes is
+    /// alive while the page writes them.
+    reserved: Option<(usize, usize, Arena)>,
 }
 
 struct Slot<T>(UnsafeCell<T>);
@@ -122,9 +152,8 @@ pub(crate) fn reserve(package_bytes: usize) -> Result<usize, Fault> {
     unsafe { *BASIS.0.get() = None };
     // SAFETY: everything that held slices of the arena is gone.
     let mut arena = unsafe { Arena::new() };
-    let package = arena.take::<u8>(package_bytes).ok_or(Fault::OutOfMemory)?;
-    let address = package.as_ptr().addr();
-    state.reserved = Some((package, arena));
+    let address = arena.reserve::<u8>(package_bytes).ok_or(Fault::OutOfMemory)?;
+    state.reserved = Some((address, package_bytes, arena));
     Ok(address)
 }
 
@@ -132,7 +161,10 @@ pub(crate) fn reserve(package_bytes: usize) -> Result<usize, Fault> {
 pub(crate) fn open() -> Result<(), Fault> {
     // SAFETY: as in `reserve`.
     let state = unsafe { &mut *STATE.0.get() };
-    let (package, mut arena) = state.reserved.take().ok_or(Fault::NothingReserved)?;
+    let (address, length, mut arena) = state.reserved.take().ok_or(Fault::NothingReserved)?;
+    // SAFETY: the arena reserved these bytes, which linear memory holds whatever the page wrote; nobody writes them before
+    // the next `reserve`, which ends this slice.
+    let package = unsafe { core::slice::from_raw_parts(core::ptr::with_exposed_provenance(address), length) };
     let opened = Basis::open(package).map_err(Fault::Open)?;
     // SAFETY: a reservation means no player, and it is used up: the basis is written before it is borrowed, and not
     // again until `reserve` has dropped the player.
@@ -140,17 +172,32 @@ pub(crate) fn open() -> Result<(), Fault> {
     let vertex_count = basis.vertex_count();
     let layout = WorkspaceLayout::for_basis(basis);
     let memory = arena.take::<u8>(layout.unaligned_bytes());
+    let held = arena.take::<u8>(HandlesLayout::for_basis(basis, HELD_MAX).unaligned_bytes());
     let weights = arena.take::<f32>(basis.component_count());
+    let faces = arena.take::<[u32; 3]>(basis.face_count());
     let (positions, normals) = (arena.take(vertex_count), arena.take(vertex_count));
-    let (Some(memory), Some(weights), Some(positions), Some(normals)) = (memory, weights, positions, normals) else {
+    let (Some(memory), Some(held), Some(weights)) = (memory, held, weights) else {
         return Err(Fault::OutOfMemory);
     };
+    let Some(faces) = faces else {
+        return Err(Fault::OutOfMemory);
+    };
+    let (Some(positions), Some(normals)) = (positions, normals) else {
+        return Err(Fault::OutOfMemory);
+    };
+    faces
+        .iter_mut()
+        .zip(basis.faces().iter())
+        .for_each(|(to, face)| *to = face);
     let mut player = Player {
         basis,
         controls: Controls::new(basis, weights)?,
+        held: Handles::new(basis, HELD_MAX, held).map_err(Fault::Workspace)?,
         workspace: Workspace::new(basis, memory).map_err(Fault::Workspace)?,
+        faces,
         positions,
         normals,
+        is_drawn: false,
     };
     player.frame()?;
     state.player = Some(player);

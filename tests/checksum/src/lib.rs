@@ -1,13 +1,14 @@
-//! Fixed poses and one checksum over their frames, for every program that shows the same bits on another target: x86-64,
-//! wasm32 and Cortex-M7 take both from here.
+//! Fixed poses and one checksum over their frames, for every program that shows the same bits on another target.
 //!
-//! Path of data: [`knobs`] -> [`weight`] -> [`sinew_runtime::Controls`] -> [`sinew_runtime::Frame`] -> [`Checksum`].
+//! Path of data: [`knobs`] -> [`sinew_runtime::Controls`] -> [`sinew_runtime::Frame`] -> [`Checksum`].
 #![no_std]
 #![forbid(unsafe_code)]
 
 use core::fmt;
+use core::hash::Hasher;
 
-use sinew_runtime::{Component, ControlError, Controls, Frame, FrameError, Workspace};
+use fnv::FnvHasher;
+use sinew_runtime::{ControlError, Controls, Frame, FrameError, Workspace};
 
 /// What a ten-bit knob reads at its upper stop.
 pub const FULL_SCALE: u16 = 1023;
@@ -30,12 +31,6 @@ pub fn knobs(n: usize, component_count: usize) -> impl Iterator<Item = u16> {
     })
 }
 
-/// The weight of a knob that goes from one stop of its component to the other.
-pub fn weight(component: &Component<'_>, knob: u16) -> f32 {
-    let share = f32::from(knob) / f32::from(FULL_SCALE);
-    component.minimum + share * (component.maximum - component.minimum)
-}
-
 /// FNV-1a over the bits of points, 64 bits wide.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Checksum(pub u64);
@@ -47,10 +42,12 @@ impl Checksum {
     /// With `points` appended.
     #[must_use]
     pub fn with(self, points: &[[f32; 3]]) -> Self {
-        let bytes = points.as_flattened().iter().flat_map(|x| x.to_bits().to_le_bytes());
-        Self(bytes.fold(self.0, |sum, byte| {
-            (sum ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3)
-        }))
+        let mut hasher = FnvHasher::with_key(self.0);
+        points
+            .as_flattened()
+            .iter()
+            .for_each(|x| hasher.write(&x.to_bits().to_le_bytes()));
+        Self(hasher.finish())
     }
 }
 
@@ -96,9 +93,8 @@ pub fn play(
     let mut checksum = Checksum::START;
     for n in 0..POSE_COUNT {
         for (k, knob) in knobs(n, basis.component_count()).enumerate() {
-            controls
-                .set(k, weight(&basis.component(k), knob))
-                .map_err(Refusal::Control)?;
+            let share = f32::from(knob) / f32::from(FULL_SCALE);
+            controls.set_share(k, share).map_err(Refusal::Control)?;
         }
         let job = Frame {
             basis: &basis,

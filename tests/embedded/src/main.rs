@@ -69,8 +69,12 @@ fn play_package() -> Result<Checksum, Failure> {
         return Err(Failure::TooLarge);
     }
     let mut memory = [0_u8; WORKSPACE_BYTES];
-    let mut workspace =
-        Workspace::with_kernels(&basis, &mut memory, Kernels::Scalar).map_err(|_| Failure::Workspace)?;
+    // Four lanes, where the target has them: the bits are those of one.
+    let kernels = [Kernels::Portable, Kernels::Scalar]
+        .into_iter()
+        .find(|kernels| kernels.run_here());
+    let mut workspace = Workspace::with_kernels(&basis, &mut memory, kernels.unwrap_or(Kernels::Scalar))
+        .map_err(|_| Failure::Workspace)?;
     let mut controls = Controls::new(&basis, &mut weights[..component_count]).map_err(|_| Failure::Controls)?;
     let (positions, normals) = (&mut positions[..vertex_count], &mut normals[..vertex_count]);
     play(&mut controls, &mut workspace, positions, normals).map_err(|_| Failure::Frame)

@@ -5,6 +5,7 @@
 //! of the bytes behind it as it says.
 #![no_main]
 
+use core::ffi::c_void;
 use core::ptr::{null, null_mut};
 use std::sync::LazyLock;
 
@@ -29,7 +30,7 @@ impl Memory {
         Self(vec![Line([0; 64]); layout.size_bytes.div_ceil(64)])
     }
 
-    fn at(&mut self) -> (*mut u8, usize) {
+    fn at(&mut self) -> (*mut c_void, usize) {
         (self.0.as_mut_ptr().cast(), 64 * self.0.len())
     }
 }
@@ -48,7 +49,7 @@ unsafe fn perform(choice: u8, mut steps: &[u8]) {
     unsafe {
         let mut room = Memory::new(|layout| sinew_basis_layout(layout));
         let ((at, bytes), mut basis) = (room.at(), null_mut());
-        let (start, length) = (PACKAGE.as_ptr(), PACKAGE.len());
+        let (start, length) = (PACKAGE.as_ptr().cast(), PACKAGE.len());
         let status = sinew_basis_open(SINEW_ABI_VERSION, start, length, at, bytes, &mut basis, null_mut());
         assert_eq!(status, SinewStatus::Ok);
         let mut room = Memory::new(|layout| sinew_controls_layout(basis, layout));
@@ -69,7 +70,7 @@ unsafe fn perform(choice: u8, mut steps: &[u8]) {
         settings.struct_bytes = size_of::<SinewSurfaceSettings>();
         settings.knob_count = 8;
         settings.tree_takeover = i32::from(choice >> 5 & 3);
-        settings.follow_supply = u32::from(choice >> 7);
+        settings.spike_guard = u32::from(choice >> 7);
         let mut room = Memory::new(|layout| sinew_surface_layout(basis, &settings, layout, null_mut()));
         let ((at, bytes), mut surface) = (room.at(), null_mut());
         let status = sinew_surface_create(basis, &settings, at, bytes, &mut surface, null_mut());
@@ -101,7 +102,7 @@ unsafe fn perform(choice: u8, mut steps: &[u8]) {
                 _ => {
                     let (now, later) = steps.split_at(steps.len().min(4 * argument as usize));
                     steps = later;
-                    let status = sinew_decoder_feed_packet(decoder, now_us, now.as_ptr(), now.len());
+                    let status = sinew_decoder_feed_packet(decoder, now_us, now.as_ptr().cast(), now.len());
                     assert_eq!(status, SinewStatus::Ok);
                     fed += now.len() as u64;
                 }
@@ -124,7 +125,7 @@ unsafe fn feed(decoder: *mut SinewDecoder, surface: *mut SinewSurface, now_us: u
     unsafe {
         loop {
             let (start, left, mut taken) = (bytes.as_ptr().add(done), bytes.len() - done, 0);
-            let status = sinew_decoder_feed(decoder, now_us, start, left, &mut taken);
+            let status = sinew_decoder_feed(decoder, now_us, start.cast(), left, &mut taken);
             assert_eq!(status, SinewStatus::Ok);
             done += taken;
             let mut reading: SinewReading = core::mem::zeroed();
@@ -134,9 +135,13 @@ unsafe fn feed(decoder: *mut SinewDecoder, surface: *mut SinewSurface, now_us: u
                 if reading.kind == SinewReadingKind::None as i32 {
                     break;
                 }
-                assert_eq!(sinew_surface_take(surface, now_us, &reading), SinewStatus::Ok);
+                assert_eq!(sinew_surface_read(surface, &reading), SinewStatus::Ok);
             }
             if done == bytes.len() {
+                let (mut greeting, mut length) = ([0_u8; SINEW_GREETING_BYTES], usize::MAX);
+                let (at, room) = (greeting.as_mut_ptr().cast(), greeting.len());
+                let status = sinew_decoder_greeting(decoder, now_us, at, room, &mut length);
+                assert_eq!((status, length <= room), (SinewStatus::Ok, true));
                 return done as u64;
             }
         }

@@ -4,6 +4,6 @@
 mod knobs;
 
 use libfuzzer_sys::fuzz_target;
-use sinew_runtime::input::Protocol;
+use sinew_knobs::Protocol;
 
 fuzz_target!(|data: &[u8]| knobs::check(Some(Protocol::Lines), data));

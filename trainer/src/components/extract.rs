@@ -1,11 +1,14 @@
 //! From trained weights to the compact package: one record and one sparse row a component, redundant ones removed, the
 //! rest ordered by what they move.
 
-use half::f16;
 use serde::{Deserialize, Serialize};
-use sinew_formats::interchange::RenderSurface;
-use sinew_formats::package::{BlockRecord, CompactBasis, ComponentRecord, NONE, Provenance, Quality, RenderMesh};
+use sinew_formats::package::{
+    After, BlockRecord, CompactBasis, ComponentRecord, NONE, Prior, Provenance, Quality, Surface, ValueScales,
+};
+use sinew_interchange::RenderSurface;
 
+use super::prior::WeightPrior;
+use crate::evaluate::EncoderRecord;
 use crate::network::attention::Attention;
 use crate::network::weights::StackWeights;
 
@@ -23,6 +26,14 @@ pub struct PruneSettings {
     pub entries_per_vertex: f64,
     /// Entries that stay in any case: a frame's cost goes with all of them, so a small mesh affords more on a vertex.
     pub entries_min: usize,
+}
+
+impl PruneSettings {
+    /// Entries that may stay on a mesh of so many vertices.
+    pub fn entry_budget(&self, vertex_count: usize) -> usize {
+        let budget = (self.entries_per_vertex * vertex_count as f64) as usize;
+        budget.max(self.entries_min)
+    }
 }
 
 impl Default for PruneSettings {
@@ -78,6 +89,15 @@ pub struct LearnedBlock {
     pub components: Vec<LearnedComponent>,
 }
 
+/// Loose pieces that move as a whole, P of them. See [`After`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pieces {
+    /// The piece of each vertex, or [`sinew_formats::package::NO_PIECE`]. Shape: `[V]`.
+    pub piece_of: Vec<u16>,
+    /// How far a piece moves a unit of weight, units of the source. Shape: `[K][P]`, K in the basis' order.
+    pub offsets: Vec<[f32; 3]>,
+}
+
 /// Everything the compact package says about the network, owned and editable.
 #[derive(Debug, Clone)]
 pub struct LearnedBasis {
@@ -95,8 +115,14 @@ pub struct LearnedBasis {
     pub stretch_scale: f32,
     /// Texture coordinates, where the reference has some.
     pub render: Option<RenderSurface>,
+    /// What the package keeps for its encoder; nothing where it is the paper's.
+    pub encoder: Option<EncoderRecord>,
     /// Parents before children, level by level.
     pub blocks: Vec<LearnedBlock>,
+    /// Where loose pieces stand; known last, when components no longer change.
+    pub pieces: Option<Pieces>,
+    /// What is known of the weights; known last, too.
+    pub prior: Option<WeightPrior>,
 }
 
 /// The mesh and the scales behind a [`LearnedBasis`].
@@ -115,12 +141,14 @@ pub struct BasisFrame {
     pub stretch_scale: f32,
     /// Texture coordinates, where the reference has some.
     pub render: Option<RenderSurface>,
+    /// What the package keeps for its encoder; nothing where it is the paper's.
+    pub encoder: Option<EncoderRecord>,
     /// Which of the root block's components are kept from older packages, and their names.
     pub kept: Vec<(usize, String)>,
 }
 
 impl LearnedBasis {
-    /// Reads the weights, rounds to half precision and measures centres and localities. `reach[l]` is
+    /// Reads the weights, rounds to what is stored and measures centres and localities. `reach[l]` is
     /// the distance within which level l was asked to stay; `distances(v)` is normalised to the longest on the mesh.
     /// Ranges and strengths are not known yet: ±1 and 0.
     pub fn from_weights(
@@ -142,7 +170,7 @@ impl LearnedBasis {
                     child_paths.push(component_path.clone());
                     let mut row: Vec<[f32; 9]> =
                         values.chunks_exact(9).map(|x| core::array::from_fn(|c| x[c])).collect();
-                    round_to_half(&mut row);
+                    round_to_stored(&mut row);
                     let centre = strongest(&row);
                     let scale = reach.get(level).or(reach.last()).copied().unwrap_or(1.0);
                     let locality = energy_within(&row, &distances(centre), scale);
@@ -183,6 +211,9 @@ impl LearnedBasis {
             rotation_scale: frame.rotation_scale,
             stretch_scale: frame.stretch_scale,
             render: frame.render,
+            pieces: None,
+            prior: None,
+            encoder: frame.encoder,
             blocks,
         }
     }
@@ -209,8 +240,7 @@ impl LearnedBasis {
     /// change features least when their control stands at its farther stop, so that weak components lose more than
     /// strong ones. Ranges must be known; centres and localities are measured anew.
     pub fn cut_faint_parts(&mut self, settings: &PruneSettings, distances: &dyn Fn(usize) -> Vec<f32>) {
-        let budget = (settings.entries_per_vertex * self.rest_positions.len() as f64) as usize;
-        let budget = budget.max(settings.entries_min);
+        let budget = settings.entry_budget(self.rest_positions.len());
         let effect = |component: &LearnedComponent, x: &[f32; 9]| energy(x) * f64::from(component.reach()).powi(2);
         let mut effects: Vec<f64> = self
             .components()
@@ -309,7 +339,8 @@ impl LearnedBasis {
         quality: Quality,
         write: impl FnOnce(&CompactBasis<'_>) -> T,
     ) -> T {
-        let words = self.rest_positions.len().div_ceil(32);
+        let vertex_count = self.rest_positions.len();
+        let words = vertex_count.div_ceil(32);
         let names: Vec<String> = self
             .components()
             .map(|component| component_name(&component.path))
@@ -331,7 +362,7 @@ impl LearnedBasis {
             record.component_count = block.components.len() as u32;
             blocks.push(record);
             for component in &block.components {
-                let value_scale = value_scale(&component.row);
+                let value_scales = ValueScales::for_values(&component.row);
                 let mut support = vec![0_u32; words];
                 for (v, x) in component
                     .row
@@ -340,7 +371,7 @@ impl LearnedBasis {
                     .filter(|(_, x)| x.iter().any(|&x| x != 0.0))
                 {
                     support[v / 32] |= 1 << (v % 32);
-                    values.push(x.map(|x| f16::from_f32(x / value_scale).to_bits()));
+                    values.push(value_scales.round(x));
                 }
                 bits.extend_from_slice(&support);
                 components.push(ComponentRecord {
@@ -352,13 +383,17 @@ impl LearnedBasis {
                     locality: component.locality,
                     minimum: component.minimum,
                     maximum: component.maximum,
-                    value_scale,
+                    value_scales,
                 });
             }
         }
+        let encoder = self.encoder.map_or_else(Vec::new, |record| record.to_bytes().to_vec());
         write(&CompactBasis {
             rest_positions: &self.rest_positions,
-            faces: &self.faces,
+            surface: match &self.render {
+                Some(render) => Surface::textured(vertex_count, &render.faces, &render.vertices, &render.uvs),
+                None => Surface::plain(vertex_count, &self.faces),
+            },
             bridges: &self.bridges,
             anchor_vertex: self.anchor_vertex,
             rotation_scale: self.rotation_scale,
@@ -367,13 +402,26 @@ impl LearnedBasis {
             components: &components,
             support_bits: &bits,
             values: &values,
+            after: match &self.pieces {
+                Some(pieces) => After {
+                    piece_of: &pieces.piece_of,
+                    piece_offsets: &pieces.offsets,
+                    ..After::NONE
+                },
+                None => After::NONE,
+            },
+            prior: match &self.prior {
+                Some(prior) => Prior {
+                    mean: &prior.mean,
+                    factors: &prior.factors,
+                    variances: &prior.variances,
+                    strength: prior.strength,
+                },
+                None => Prior::NONE,
+            },
+            encoder: &encoder,
             provenance,
             quality,
-            render: self.render.as_ref().map_or(RenderMesh::NONE, |render| RenderMesh {
-                vertices: &render.vertices,
-                uvs: &render.uvs,
-                faces: &render.faces,
-            }),
         })
     }
 }
@@ -411,18 +459,11 @@ fn energy_within(row: &[[f32; 9]], distances: &[f32], reach: f32) -> f32 {
     if total > 0.0 { (within / total) as f32 } else { 1.0 }
 }
 
-/// What half-precision values are multiples of: the largest magnitude of the row, so that the best-resolved part of the
-/// half range is used. 1 for a row of zeros.
-fn value_scale(row: &[[f32; 9]]) -> f32 {
-    let largest = row.iter().flatten().fold(0.0_f32, |m, x| m.max(x.abs()));
-    if largest > 0.0 { largest } else { 1.0 }
-}
-
 /// Rounds to what the package will hold, so that everything measured later is measured on the shipped numbers.
-fn round_to_half(row: &mut [[f32; 9]]) {
-    let scale = value_scale(row);
-    for x in row.iter_mut().flatten() {
-        *x = f16::from_f32(*x / scale).to_f32() * scale;
+fn round_to_stored(row: &mut [[f32; 9]]) {
+    let scales = ValueScales::for_values(row);
+    for x in row.iter_mut() {
+        *x = scales.widen(&scales.round(x));
     }
 }
 

@@ -5,6 +5,7 @@ use sinew_formats::package::{CompactView, FEATURE_COUNT};
 
 use crate::bake::Surface;
 use crate::bake::sparse::unpack_components;
+use crate::mesh::topology::Topology;
 
 /// Cosine from which two components of one level count as duplicates.
 pub const DUPLICATE_COSINE: f64 = 0.9;
@@ -72,7 +73,7 @@ pub struct Response {
 pub fn responses_of(package: &CompactView<'_>, surface: &Surface) -> Vec<Response> {
     let blocks: Vec<_> = package.blocks().collect();
     let scales = scales_of(package);
-    let blends = package.components().zip(blends_of(package, surface));
+    let blends = package.components().zip(blends_of(package, &surface.topology));
     blends
         .map(|(component, blend)| {
             let bias = blocks[component.block as usize].decoder.bias;
@@ -92,7 +93,7 @@ pub fn responses_of(package: &CompactView<'_>, surface: &Surface) -> Vec<Respons
 pub fn fields_of(package: &CompactView<'_>, surface: &Surface) -> Vec<Field> {
     let blocks: Vec<_> = package.blocks().collect();
     let scales = scales_of(package);
-    let blends = package.components().zip(blends_of(package, surface));
+    let blends = package.components().zip(blends_of(package, &surface.topology));
     blends
         .map(|(component, blend)| {
             let block = &blocks[component.block as usize];
@@ -129,14 +130,15 @@ fn scales_of(package: &CompactView<'_>) -> [f64; FEATURE_COUNT] {
 }
 
 /// `point C + neighbour mean C` of one component, where it is not zero.
-struct Blend {
+pub struct Blend {
     /// Ascending.
-    vertices: Vec<u32>,
-    sums: Vec<[f64; FEATURE_COUNT]>,
+    pub vertices: Vec<u32>,
+    /// Shape: that of `vertices`.
+    pub sums: Vec<[f64; FEATURE_COUNT]>,
 }
 
-fn blends_of(package: &CompactView<'_>, surface: &Surface) -> Vec<Blend> {
-    let topology = &surface.topology;
+/// The blends of all components, in the order of the package; `topology` is the package's.
+pub fn blends_of(package: &CompactView<'_>, topology: &Topology) -> Vec<Blend> {
     let blocks: Vec<_> = package.blocks().collect();
     let mut sums = vec![[0.0; FEATURE_COUNT]; topology.vertex_count];
     let mut touched = vec![false; topology.vertex_count];
@@ -147,17 +149,12 @@ fn blends_of(package: &CompactView<'_>, surface: &Surface) -> Vec<Blend> {
             let decoder = &blocks[component.block as usize].decoder;
             let mut vertices = Vec::with_capacity(sparse.vertices.len());
             let mut add =
-                |v: u32, matrix: &[[f32; FEATURE_COUNT]; FEATURE_COUNT], x: &[f32; FEATURE_COUNT], share: f64| {
+                |v: u32, matrix: &[[f32; FEATURE_COUNT]; FEATURE_COUNT], x: &[f64; FEATURE_COUNT], share: f64| {
                     if !core::mem::replace(&mut touched[v as usize], true) {
                         vertices.push(v);
                     }
                     for (sum, row) in sums[v as usize].iter_mut().zip(matrix) {
-                        *sum += share
-                            * row
-                                .iter()
-                                .zip(x)
-                                .map(|(m, x)| f64::from(*m) * f64::from(*x))
-                                .sum::<f64>();
+                        *sum += share * row.iter().zip(x).map(|(m, x)| f64::from(*m) * x).sum::<f64>();
                     }
                 };
             for (&v, x) in sparse.vertices.iter().zip(&sparse.values) {

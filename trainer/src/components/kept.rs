@@ -8,8 +8,8 @@ use std::path::PathBuf;
 
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
-use sinew_formats::interchange::MeshSequence;
 use sinew_formats::package::{CompactView, FEATURE_COUNT, GraphConvRecord, OpenError, ReadError, read_package};
+use sinew_interchange::MeshSequence;
 
 use super::fields::{Response, responses_of};
 use super::painted::{NAME_LENGTH, PaintedRegion, is_region_name};

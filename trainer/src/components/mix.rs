@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-use crate::features::store::ShapeStore;
+use sinew_interchange::ShapeStore;
 
 /// Most shapes that one mix is drawn from, chosen anew for every mix: of thousands, all at once would be their average and
 /// its price a thousandfold.
@@ -31,6 +31,14 @@ pub struct MixSettings {
     pub reach: f64,
     /// Share of mixes that blend whole shapes: one region.
     pub whole_share: f64,
+    /// Every region also turns about an axis of its own, by this share of what vertices turn on the mean: parts can do more than
+    /// a handful of shapes shows. 0 leaves it out.
+    pub turn: f64,
+    /// How far apart vertices count that move differently, against how far apart they lie: regions then end where the shapes
+    /// bend. 0 goes by the surface alone.
+    pub bend: f64,
+    /// Whether mirror images of the shapes are mixed in, where the reference is its own mirror image.
+    pub mirror: bool,
 }
 
 impl Default for MixSettings {
@@ -41,6 +49,9 @@ impl Default for MixSettings {
             regions_max: 20,
             reach: 0.14,
             whole_share: 0.1,
+            turn: 0.2,
+            bend: 0.5,
+            mirror: true,
         }
     }
 }
@@ -52,6 +63,8 @@ pub struct Mixer {
     shapes: Vec<usize>,
     distances: Vec<Vec<f32>>,
     settings: MixSettings,
+    /// Standard deviation of an entry of a region's own turn, network units.
+    turn: f32,
     seed: u64,
 }
 
@@ -60,6 +73,7 @@ struct SoftRegion {
     centre: usize,
     inverse_two_sigma_squared: f32,
     blend: Vec<f32>,
+    turn: [f32; 3],
 }
 
 impl Mixer {
@@ -72,11 +86,13 @@ impl Mixer {
         settings: MixSettings,
         seed: u64,
     ) -> Self {
+        let turn = settings.turn as f32 * mean_turn(&store, &shapes);
         Self {
             store,
             shapes,
             distances,
             settings,
+            turn,
             seed,
         }
     }
@@ -123,6 +139,9 @@ impl Mixer {
                     for (b, a) in blend.iter_mut().zip(&region.blend) {
                         *b += share * a;
                     }
+                    for (x, turn) in x.iter_mut().zip(region.turn) {
+                        *x += share * turn;
+                    }
                 }
             }
             for (b, shape) in blend.iter().zip(&shapes) {
@@ -158,10 +177,31 @@ impl Mixer {
                     centre: rng.random_range(0..self.distances.len()),
                     inverse_two_sigma_squared: (0.5 / (sigma * sigma)) as f32,
                     blend: (0..shape_count).map(|_| deviation * standard_normal(rng)).collect(),
+                    turn: core::array::from_fn(|_| self.turn * standard_normal(rng)),
                 }
             })
             .collect()
     }
+}
+
+/// Shapes that are looked at for what a whole sequence does, spread evenly.
+pub(super) const LOOKED_AT: usize = 64;
+
+/// Some of the shapes, spread evenly.
+pub(super) fn some_of(shapes: &[usize]) -> impl Iterator<Item = usize> + Clone {
+    let step = shapes.len().div_ceil(LOOKED_AT).max(1);
+    shapes.iter().copied().step_by(step)
+}
+
+/// Root mean square of an entry of a rotation over vertices and shapes, network units.
+fn mean_turn(store: &ShapeStore<9>, shapes: &[usize]) -> f32 {
+    let (mut sum, mut count) = (0.0_f64, 0_usize);
+    for m in some_of(shapes) {
+        let values = store[m].iter().flat_map(|x| &x[..3]);
+        sum += values.map(|x| f64::from(*x).powi(2)).sum::<f64>();
+        count += 3 * store[m].len();
+    }
+    (sum / count.max(1) as f64).sqrt() as f32
 }
 
 /// One standard normal number (Box and Muller 1958).
@@ -196,6 +236,7 @@ mod tests {
     fn a_mix_of_many_shapes_takes_some_and_other_mixes_take_others() {
         let mut one = line_mixer(MixSettings {
             whole_share: 1.0,
+            turn: 0.0,
             ..MixSettings::default()
         });
         // Shape m moves vertex m alone.
@@ -210,6 +251,28 @@ mod tests {
         };
         assert_eq!(moved(0).len(), SHAPES_OF_A_MIX);
         assert_ne!(moved(0), moved(1));
+    }
+
+    #[test]
+    fn a_region_turns_as_one_beyond_what_its_shapes_do() {
+        let of = |turn: f64| {
+            line_mixer(MixSettings {
+                whole_share: 1.0,
+                turn,
+                ..MixSettings::default()
+            })
+            .mixes(2, 1)
+        };
+        let (still, turned) = (of(0.0), of(1.0));
+        let added = |v: usize, c: usize| turned[9 * v + c] - still[9 * v + c];
+        assert!((0..3).any(|c| added(0, c).abs() > 1e-3));
+        for v in 0..50 {
+            assert!(
+                (0..3).all(|c| (added(v, c) - added(0, c)).abs() < 1e-5),
+                "one region, one turn"
+            );
+            assert!((3..9).all(|c| added(v, c) == 0.0), "turns do not stretch");
+        }
     }
 
     #[test]

@@ -2,7 +2,9 @@
 //! `--set`, mapping files, takes. Until somebody renames it, that is its place in the tree: `c0`, its children `c0.0`, `c0.1`.
 //! Names of that form are kept for the places themselves, so that `c0.1` never means another component.
 
-use sinew_formats::package::{AlignedBytes, CompactBasis, CompactView, NONE, WriteError, limits, write_compact};
+use sinew_formats::package::{
+    AlignedBytes, CompactBasis, CompactView, NONE, Surface, WriteError, limits, write_compact,
+};
 
 use super::extract::component_name;
 
@@ -128,9 +130,16 @@ pub fn renamed(package: &CompactView<'_>, names: &[String]) -> Result<AlignedByt
         .zip(names)
         .map(|(component, name)| sinew_formats::package::ComponentRecord { name, ..component })
         .collect();
+    let (view, corners) = (package.surface(), package.surface().drawn_faces().to_vec());
+    let render_points = view.render_points.to_vec();
+    let surface = if view.has_texture() {
+        Surface::textured(package.vertex_count(), &corners, &render_points, view.uvs)
+    } else {
+        Surface::plain(package.vertex_count(), &corners)
+    };
     Ok(write_compact(&CompactBasis {
         rest_positions: package.rest_positions(),
-        faces: &package.faces().to_vec(),
+        surface,
         bridges: package.bridges(),
         anchor_vertex: package.anchor_vertex(),
         rotation_scale: package.rotation_scale(),
@@ -139,9 +148,11 @@ pub fn renamed(package: &CompactView<'_>, names: &[String]) -> Result<AlignedByt
         components: &components,
         support_bits: package.support_bits(),
         values: package.values(),
+        after: package.after(),
+        prior: package.prior(),
+        encoder: package.encoder(),
         provenance: package.provenance(),
         quality: package.quality(),
-        render: package.render_mesh(),
     })?)
 }
 

@@ -143,7 +143,8 @@ impl MirrorPlane {
     }
 }
 
-fn mirrored_features(x: &[f64; FEATURE_COUNT], normal: Vector3<f64>) -> [f64; FEATURE_COUNT] {
+/// The feature of the mirrored movement at the vertex behind the mirror.
+pub fn mirrored_features(x: &[f64; FEATURE_COUNT], normal: Vector3<f64>) -> [f64; FEATURE_COUNT] {
     let mirror = Matrix3::identity() - 2.0 * normal * normal.transpose();
     let r = -(mirror * Vector3::new(x[0], x[1], x[2]));
     let s = mirror * Matrix3::new(x[3], x[4], x[5], x[4], x[6], x[7], x[5], x[7], x[8]) * mirror;

@@ -1,286 +1,85 @@
-//! The network's encoder, evaluated plainly from a compact package: the paper's way to weights (method section 3, number
-//! 1). Nothing is folded here; the decoder's half is the unfolded one, so it checks the folding too.
+//! The one encoder of a package: what `sinew encode` reads weights with, what every figure of an encoder is measured with, and
+//! what validation goes by.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
-use sinew_formats::package::{BlockRecord, CompactView, FEATURE_COUNT, GraphConvRecord, NONE};
+use serde::{Deserialize, Serialize};
+use sinew_formats::package::{CompactView, FEATURE_COUNT};
 
-use crate::{
-    bake::sparse::{SparseComponent, unpack_components},
-    mesh::topology::Topology,
-    network::attention::Attention,
-};
+use super::feature_projection::FeatureProjection;
+use super::stack_encoder::{EncoderSettings, Encoding, StackEncoder};
+use super::unrolled_encoder::{EncoderRecord, UnrolledEncoder};
+use crate::mesh::topology::Topology;
 
-/// Added to every component's energy at a vertex before masks are normalised, times `1 / V`: where no component of a block
-/// lives, its masks share equally instead of dividing zero by zero. The training uses the same.
-pub const MASK_FLOOR: f64 = crate::network::kernel::MASK_FLOOR as f64;
-
-/// One value of each feature.
-type Features = [f64; FEATURE_COUNT];
-
-/// How a block's latents are read off what its convolution answers.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Reading {
-    /// `z = C h`, the paper's: right where the rows of C are orthonormal, as training keeps them nearly.
+/// How weights are read off a shape in one pass.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum EncoderKind {
+    /// By a few layers, each of which reads what those before it left by one fixed matrix that follows from the components.
     #[default]
-    Tied,
-    /// `z = (C C^T)^-1 C h`: the same for orthonormal rows, and what is nearest to h for any others. Refined components have
-    /// rows that overlap, and would count twice what they share.
-    LeastSquares,
+    Unrolled,
+    /// As the paper does: block by block, by the rows that decode.
+    Paper,
 }
 
-/// What the encoder takes from how a package was trained.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct EncoderSettings {
-    /// How residuals are shared out among blocks.
-    pub attention: Attention,
-    /// How latents are read.
-    pub reading: Reading,
+/// The encoder that a package was trained for.
+pub enum Encoder<'e> {
+    /// Of layers, each of which reads what is left by one fixed matrix.
+    Unrolled(UnrolledEncoder<'e>),
+    /// The paper's, of a package that keeps no record of another.
+    Paper(StackEncoder<'e>),
 }
 
-/// Added to the diagonal of `C C^T` as a share of its mean: rows that repeat each other keep an answer.
-const READING_RIDGE: f64 = 1e-4;
+/// What a package keeps for its encoder is of a form that this version does not know.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the package's encoder is of another version: read its weights with the version of sinew that trained it")]
+pub struct UnknownEncoder;
 
-/// The encoder of a package, ready for any number of shapes. V vertices, B blocks, K components.
-#[derive(Debug, Clone)]
-pub struct StackEncoder<'t> {
-    topology: &'t Topology,
-    blocks: Vec<BlockRecord>,
-    components: Vec<SparseComponent>,
-    /// Attention masks of the components that have a block below them; empty for the others. Shape: `[K][V]`.
-    masks: Vec<Vec<f64>>,
-    /// Factors of `C C^T`; nothing where latents are read as they are. Shape: `[B]`.
-    readings: Vec<Option<Cholesky<f64, Dyn>>>,
-}
-
-/// What the encoder says of one shape.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Encoding {
-    /// Weights of all components. Shape: `[K]`.
-    pub weights: Vec<f64>,
-    /// `|X - Xhat|^2` after the root block alone.
-    pub root_residual_energy: f64,
-    /// `|X - Xhat|^2` after all levels.
-    pub residual_energy: f64,
-    /// `|X|^2`.
-    pub energy: f64,
-}
-
-impl<'t> StackEncoder<'t> {
-    /// Prepares the masks. `topology` is that of the package ([`crate::bake::Surface`]); `settings` those of its training.
-    pub fn new(package: &CompactView<'_>, topology: &'t Topology, settings: EncoderSettings) -> Self {
-        let blocks: Vec<BlockRecord> = package.blocks().collect();
-        let components = unpack_components(package);
-        let mut masks = vec![Vec::new(); components.len()];
-        for block in &blocks {
-            let members = component_range(block);
-            let has_child = |k: usize| blocks.iter().any(|child| child.parent_component == k as u32);
-            if members.clone().any(has_child) {
-                let block_masks = match settings.attention {
-                    Attention::Components => attention_masks(topology.vertex_count, &components[members.clone()]),
-                    Attention::Equal => {
-                        vec![vec![1.0 / members.len() as f64; topology.vertex_count]; members.len()]
-                    }
-                };
-                for (k, mask) in members.zip(block_masks) {
-                    masks[k] = mask;
-                }
-            }
+impl<'e> Encoder<'e> {
+    /// `projection` and `topology` are the package's, `settings` those of its training.
+    /// Errors: a record of an unknown form.
+    pub fn of_package(
+        package: &CompactView<'_>,
+        topology: &'e Topology,
+        projection: &'e FeatureProjection<'e>,
+        settings: EncoderSettings,
+    ) -> Result<Self, UnknownEncoder> {
+        if package.encoder().is_empty() {
+            return Ok(Self::Paper(StackEncoder::new(package, topology, settings)));
         }
-        let readings = blocks.iter().map(|block| match settings.reading {
-            Reading::Tied => None,
-            Reading::LeastSquares => factor_of_rows(topology.vertex_count, &components[component_range(block)]),
-        });
-        Self {
-            topology,
-            readings: readings.collect(),
-            blocks,
-            components,
-            masks,
+        let record = EncoderRecord::from_bytes(package.encoder()).ok_or(UnknownEncoder)?;
+        let roots = package.components().filter(|component| component.block == 0).count();
+        Ok(Self::Unrolled(UnrolledEncoder::new(projection, record, roots)))
+    }
+
+    /// Weights of one shape. Shapes: `features` `[V]`, source order, network units; the answer `[K]`.
+    pub fn weights(&self, features: &[[f32; FEATURE_COUNT]]) -> Vec<f64> {
+        match self {
+            Self::Unrolled(encoder) => encoder.weights(features),
+            Self::Paper(encoder) => encoder.encode(features).weights,
         }
     }
 
-    /// Encodes one shape, coarse to fine: each child block reads its parent's residual through its component's mask.
-    /// Shape: `features` `[V]`, source order, network units.
+    /// Where a search for better weights starts: at the encoder's `weights`, or at rest where they are the paper's, which need not
+    /// be nearer.
+    pub fn start_of_projection(&self, weights: &[f64]) -> Vec<f64> {
+        match self {
+            Self::Unrolled(_) => weights.to_vec(),
+            Self::Paper(_) => vec![0.0; weights.len()],
+        }
+    }
+
+    /// Weights of one shape, and what the root block and all blocks leave of its features.
     pub fn encode(&self, features: &[[f32; FEATURE_COUNT]]) -> Encoding {
-        let whole: Vec<Features> = features.iter().map(|x| x.map(f64::from)).collect();
-        let mut weights = vec![0.0; self.components.len()];
-        let mut residuals: Vec<Vec<Features>> = Vec::with_capacity(self.blocks.len());
-        let mut sum = vec![[0.0; FEATURE_COUNT]; whole.len()];
-        let mut root_sum = Vec::new();
-        for (block, reading) in self.blocks.iter().zip(&self.readings) {
-            let input = match block.parent_component {
-                NONE => whole.clone(),
-                parent => {
-                    let parent = parent as usize;
-                    masked(&self.masks[parent], &residuals[self.block_of(parent)])
-                }
-            };
-            let hidden = convolve(&block.encoder, self.topology, &input);
-            let mut blend = vec![[0.0; FEATURE_COUNT]; whole.len()];
-            let mut latents = DVector::from_iterator(
-                component_range(block).len(),
-                component_range(block).map(|k| self.latent(k, &hidden)),
-            );
-            if let Some(reading) = reading {
-                reading.solve_mut(&mut latents);
-            }
-            for (k, &latent) in component_range(block).zip(&latents) {
-                weights[k] = latent;
-                self.blend(k, latent, &mut blend);
-            }
-            let output = convolve(&block.decoder, self.topology, &blend);
-            residuals.push(difference(&input, &output));
-            add(&mut sum, &output);
-            if block.parent_component == NONE && root_sum.is_empty() {
-                root_sum.clone_from(&sum);
-            }
-        }
-        Encoding {
-            weights,
-            root_residual_energy: energy(&difference(&whole, &root_sum)),
-            residual_energy: energy(&difference(&whole, &sum)),
-            energy: energy(&whole),
-        }
-    }
-
-    /// Features of given weights: the sum of all blocks' decoders, unfolded. Shapes: `[K]` to `[V]`, source order.
-    pub fn decode(&self, weights: &[f64]) -> Vec<[f64; FEATURE_COUNT]> {
-        let mut sum = vec![[0.0; FEATURE_COUNT]; self.topology.vertex_count];
-        for block in &self.blocks {
-            let mut blend = vec![[0.0; FEATURE_COUNT]; sum.len()];
-            for k in component_range(block) {
-                self.blend(k, weights[k], &mut blend);
-            }
-            add(&mut sum, &convolve(&block.decoder, self.topology, &blend));
-        }
-        sum
-    }
-
-    fn block_of(&self, k: usize) -> usize {
-        self.blocks.partition_point(|block| block.first_component as usize <= k) - 1
-    }
-
-    /// `z_k = sum_v C_k,v . h_v`.
-    fn latent(&self, k: usize, hidden: &[Features]) -> f64 {
-        let component = &self.components[k];
-        let entries = component.vertices.iter().zip(&component.values);
-        entries
-            .map(|(&v, value)| {
-                (0..FEATURE_COUNT)
-                    .map(|c| f64::from(value[c]) * hidden[v as usize][c])
-                    .sum::<f64>()
-            })
-            .sum()
-    }
-
-    fn blend(&self, k: usize, weight: f64, blend: &mut [Features]) {
-        let component = &self.components[k];
-        for (&v, value) in component.vertices.iter().zip(&component.values) {
-            for c in 0..FEATURE_COUNT {
-                blend[v as usize][c] += weight * f64::from(value[c]);
-            }
-        }
-    }
-}
-
-fn component_range(block: &BlockRecord) -> core::ops::Range<usize> {
-    let first = block.first_component as usize;
-    first..first + block.component_count as usize
-}
-
-/// `C C^T` of a block, factored. Sparse rows name their vertices, which pass through one row of `[V]`.
-fn factor_of_rows(vertex_count: usize, components: &[SparseComponent]) -> Option<Cholesky<f64, Dyn>> {
-    let count = components.len();
-    let mut gram = DMatrix::zeros(count, count);
-    let mut row = vec![[0.0; FEATURE_COUNT]; vertex_count];
-    for (i, component) in components.iter().enumerate() {
-        row.fill([0.0; FEATURE_COUNT]);
-        for (&v, value) in component.vertices.iter().zip(&component.values) {
-            row[v as usize] = value.map(f64::from);
-        }
-        for (j, other) in components.iter().enumerate() {
-            let entries = other.vertices.iter().zip(&other.values);
-            gram[(i, j)] = entries
-                .map(|(&v, value)| {
-                    let own = &row[v as usize];
-                    (0..FEATURE_COUNT).map(|c| own[c] * f64::from(value[c])).sum::<f64>()
-                })
-                .sum();
-        }
-    }
-    let ridge = READING_RIDGE * gram.diagonal().sum() / count.max(1) as f64;
-    for k in 0..count {
-        gram[(k, k)] += ridge;
-    }
-    Cholesky::new(gram)
-}
-
-/// `AM_k,v = (|C_k,v|^2 + f) / (sum_k |C_k,v|^2 + K f)` with `f = MASK_FLOOR / V`; sums to one over the block's components.
-fn attention_masks(vertex_count: usize, components: &[SparseComponent]) -> Vec<Vec<f64>> {
-    let floor = MASK_FLOOR / vertex_count as f64;
-    let mut masks = vec![vec![floor; vertex_count]; components.len()];
-    let mut sums = vec![floor * components.len() as f64; vertex_count];
-    for (mask, component) in masks.iter_mut().zip(components) {
-        for (&v, value) in component.vertices.iter().zip(&component.values) {
-            let strength: f64 = value.iter().map(|&x| f64::from(x) * f64::from(x)).sum();
-            mask[v as usize] += strength;
-            sums[v as usize] += strength;
-        }
-    }
-    for mask in &mut masks {
-        for (share, sum) in mask.iter_mut().zip(&sums) {
-            *share /= sum;
-        }
-    }
-    masks
-}
-
-/// `tanh(point x_v + neighbour mean_{j in ring(v)} x_j + bias) - tanh(bias)`.
-fn convolve(conv: &GraphConvRecord, topology: &Topology, input: &[Features]) -> Vec<Features> {
-    let widen = |matrix: &[[f32; FEATURE_COUNT]; FEATURE_COUNT]| matrix.map(|row| row.map(f64::from));
-    let (point, neighbour, bias) = (widen(&conv.point), widen(&conv.neighbour), conv.bias.map(f64::from));
-    let at_rest = bias.map(f64::tanh);
-    (0..input.len())
-        .map(|v| {
-            let ring = topology.ring_of(v);
-            let mut mean = [0.0; FEATURE_COUNT];
-            for &j in ring {
-                for c in 0..FEATURE_COUNT {
-                    mean[c] += input[j as usize][c];
+        match self {
+            Self::Unrolled(encoder) => {
+                let weights = encoder.weights(features);
+                Encoding {
+                    root_residual_energy: encoder.left_by(&encoder.root_weights(features), features),
+                    residual_energy: encoder.left_by(&weights, features),
+                    energy: features.as_flattened().iter().map(|&x| f64::from(x).powi(2)).sum(),
+                    weights,
                 }
             }
-            let mean = mean.map(|sum| sum / ring.len().max(1) as f64);
-            core::array::from_fn(|out| {
-                let along = |row: &Features, x: &Features| row.iter().zip(x).map(|(w, x)| w * x).sum::<f64>();
-                let linear = along(&point[out], &input[v]) + along(&neighbour[out], &mean) + bias[out];
-                linear.tanh() - at_rest[out]
-            })
-        })
-        .collect()
-}
-
-fn masked(mask: &[f64], features: &[Features]) -> Vec<Features> {
-    mask.iter()
-        .zip(features)
-        .map(|(&share, x)| x.map(|x| share * x))
-        .collect()
-}
-
-fn difference(a: &[Features], b: &[Features]) -> Vec<Features> {
-    a.iter()
-        .zip(b)
-        .map(|(a, b)| core::array::from_fn(|c| a[c] - b[c]))
-        .collect()
-}
-
-fn add(sum: &mut [Features], x: &[Features]) {
-    for (sum, x) in sum.iter_mut().zip(x) {
-        for c in 0..FEATURE_COUNT {
-            sum[c] += x[c];
+            Self::Paper(encoder) => encoder.encode(features),
         }
     }
-}
-
-fn energy(x: &[Features]) -> f64 {
-    x.as_flattened().iter().map(|x| x * x).sum()
 }

@@ -1,29 +1,21 @@
-//! Evaluates a package on shapes it was not trained on: four ways to find weights, each decoded and solved by the
+//! Evaluates a package on shapes it was not trained on: three ways to find weights, each decoded and solved by the
 //! runtime, scored against the truth (method sections 3 and 4).
 
 use core::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use sinew_formats::{
-    interchange::MeshSequence,
-    package::{BakedView, CompactView, FEATURE_COUNT, OpenError},
-};
+use sinew_formats::package::{CompactView, OpenError};
+use sinew_interchange::MeshSequence;
 use sinew_runtime::{Basis, Workspace, WorkspaceError, WorkspaceLayout};
 
 use super::{
-    EncoderSettings, Encoding, FeatureDecoder, FeatureMetric, FeatureProjection, PlayError, Player, ScoreError, Scores,
-    StackEncoder, project_positions, score,
+    Encoder, EncoderSettings, Encoding, FeatureProjection, PlayError, Player, ScoreError, Scores, UnknownEncoder,
+    project_positions, score, shape_reader::ShapeReader,
 };
 use crate::{
-    bake::{BakeError, Surface, bake},
-    features::{
-        acap::features_of_shape,
-        align::{RigidMotion, widened},
-        gradient::{FeatureSettings, GradientFit},
-        reconstruct::PoissonSystem,
-        scaler::FeatureScaler,
-    },
+    bake::{BakeError, bake},
+    features::gradient::{FeatureSettings, GradientFit},
     mesh::sparse_factor::FactorError,
 };
 
@@ -40,7 +32,7 @@ pub struct EvaluationInput<'a> {
     pub trained_shapes: &'a [usize],
     /// Settings of the features, those of the training.
     pub settings: FeatureSettings,
-    /// What the encoder takes from the training.
+    /// What the paper's encoder takes from the training.
     pub encoder: EncoderSettings,
 }
 
@@ -53,12 +45,9 @@ pub struct Evaluation {
     pub vertices: usize,
     /// Components of the package.
     pub components: ComponentCounts,
-    /// Weights from the network's encoder: level by level, residuals shared out by attention.
+    /// Weights from the package's encoder, in one pass.
     pub encoder: Scores,
-    /// Weights from one pass of least squares: the pseudo-inverse of the whole decoder at rest, in the metric of
-    /// [`FeatureMetric`].
-    pub linear_encoder: Scores,
-    /// Weights by least squares in feature space, in the metric of [`FeatureMetric`].
+    /// Weights by least squares in feature space, in the metric of [`crate::features::metric::FeatureMetric`].
     pub feature_projection: Scores,
     /// Weights by Gauss-Newton on positions.
     pub position_projection: Scores,
@@ -82,36 +71,24 @@ pub struct ComponentCounts {
 /// `max_m |X_m - Xhat_m|^2 / |X_m|^2`, network units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MaxPercentageError {
-    /// The network's encoder, root block alone.
+    /// The encoder, root block alone.
     pub one_level: f64,
-    /// The network's encoder, all levels.
+    /// The encoder, all levels.
     pub two_level: f64,
-    /// The linear encoder, all levels.
-    pub linear: f64,
 }
 
 impl MaxPercentageError {
-    fn of<'m>(missed: impl IntoIterator<Item = &'m Missed>) -> Self {
+    fn of<'m>(encodings: impl IntoIterator<Item = &'m Encoding>) -> Self {
         let none = Self {
             one_level: 0.0,
             two_level: 0.0,
-            linear: 0.0,
         };
-        let moving = missed.into_iter().filter(|missed| missed.energy > 0.0);
-        moving.fold(none, |worst, missed| Self {
-            one_level: worst.one_level.max(missed.one_level / missed.energy),
-            two_level: worst.two_level.max(missed.two_level / missed.energy),
-            linear: worst.linear.max(missed.linear / missed.energy),
+        let moving = encodings.into_iter().filter(|encoding| encoding.energy > 0.0);
+        moving.fold(none, |worst, encoding| Self {
+            one_level: worst.one_level.max(encoding.root_residual_energy / encoding.energy),
+            two_level: worst.two_level.max(encoding.residual_energy / encoding.energy),
         })
     }
-}
-
-/// Feature energy of one shape, and what of it is missed.
-struct Missed {
-    energy: f64,
-    one_level: f64,
-    two_level: f64,
-    linear: f64,
 }
 
 /// The measured shapes, for saving and for pictures. Shape of each: `[N][V]`, source order.
@@ -121,8 +98,6 @@ pub struct Reconstructions {
     pub truth: Vec<Vec<[f32; 3]>>,
     /// Near the reference, like all that follow.
     pub encoder: Vec<Vec<[f32; 3]>>,
-    /// Near the reference.
-    pub linear_encoder: Vec<Vec<[f32; 3]>>,
     /// Near the reference.
     pub feature_projection: Vec<Vec<[f32; 3]>>,
     /// Near the reference.
@@ -176,6 +151,9 @@ pub enum EvaluationError {
     /// The mesh's matrix cannot be factored.
     #[error("the mesh cannot be solved on")]
     Factor(#[from] FactorError),
+    /// Its encoder cannot be used.
+    #[error(transparent)]
+    Encoder(#[from] UnknownEncoder),
     /// No memory for the runtime.
     #[error("the runtime's workspace cannot be made")]
     Workspace(#[from] WorkspaceError),
@@ -186,9 +164,8 @@ pub enum EvaluationError {
 
 /// Everything found for one shape.
 struct ShapeResult {
-    missed: Missed,
+    encoding: Encoding,
     encoder: Vec<[f32; 3]>,
-    linear_encoder: Vec<[f32; 3]>,
     feature_projection: Vec<[f32; 3]>,
     position_projection: Vec<[f32; 3]>,
     position_weights: Vec<f64>,
@@ -205,17 +182,23 @@ pub fn evaluate(
     let package = CompactView::open(input.package)?;
     check(input, &package)?;
     let baked = bake(&package)?;
-    let bench = Bench::new(&package, &baked)?;
-    let surface = &bench.surface;
-    let fit = GradientFit::new(&surface.topology, &surface.rest, &input.settings);
-    let encoder = StackEncoder::new(&package, &surface.topology, input.encoder);
-    let projection = bench.projection();
+    let reader = ShapeReader::new(&package)?;
+    let basis = Basis::open(&baked)?;
+    let projection = reader.projection();
+    let bench = Bench {
+        fit: reader.gradients(&input.settings),
+        encoder: reader.encoder(&projection, input.encoder)?,
+        projection: &projection,
+        layout: WorkspaceLayout::for_basis(&basis),
+        basis: &basis,
+        reader: &reader,
+    };
     let done = AtomicUsize::new(0);
     let results: Vec<ShapeResult> = input
         .test_shapes
         .par_iter()
         .map(|&m| {
-            let result = bench.measure(&fit, &encoder, &projection, m, &input.sequence.shapes[m]);
+            let result = bench.measure(m, &input.sequence.shapes[m]);
             progress(done.fetch_add(1, Ordering::Relaxed) + 1);
             result
         })
@@ -225,21 +208,20 @@ pub fn evaluate(
     let truth: Vec<Vec<[f32; 3]>> = input
         .test_shapes
         .iter()
-        .map(|&m| input.sequence.shapes[m].clone())
+        .map(|&m| input.sequence.shapes[m].to_vec())
         .collect();
     let coarse = package
         .blocks()
         .filter(|b| b.level == 0)
         .map(|b| b.component_count as usize)
         .sum();
-    let max_percentage_error = MaxPercentageError::of(results.iter().map(|result| &result.missed));
-    let trained: Vec<Missed> = input
+    let max_percentage_error = MaxPercentageError::of(results.iter().map(|result| &result.encoding));
+    let trained: Vec<Encoding> = input
         .trained_shapes
         .par_iter()
         .map(|&m| {
-            let features = bench.features(&fit, &input.sequence.shapes[m]);
-            let linear_weights = projection.linear_weights(&features);
-            bench.missed(&encoder.encode(&features), &linear_weights, &features)
+            let features = reader.features(&bench.fit, &input.sequence.shapes[m]);
+            bench.encoder.encode(&features)
         })
         .collect();
     let trained_max_percentage_error = (!trained.is_empty()).then(|| MaxPercentageError::of(&trained));
@@ -250,7 +232,6 @@ pub fn evaluate(
     };
     for result in results {
         found.encoder.push(result.encoder);
-        found.linear_encoder.push(result.linear_encoder);
         found.feature_projection.push(result.feature_projection);
         found.position_projection.push(result.position_projection);
         found.position_weights.push(result.position_weights);
@@ -264,7 +245,6 @@ pub fn evaluate(
             fine: package.component_count() - coarse,
         },
         encoder: score(&found.truth, &found.encoder, &faces)?,
-        linear_encoder: score(&found.truth, &found.linear_encoder, &faces)?,
         feature_projection: score(&found.truth, &found.feature_projection, &faces)?,
         position_projection: score(&found.truth, &found.position_projection, &faces)?,
         round_trip: score(&found.truth, &round_trip, &faces)?,
@@ -275,18 +255,7 @@ pub fn evaluate(
 }
 
 fn check(input: &EvaluationInput<'_>, package: &CompactView<'_>) -> Result<(), EvaluationError> {
-    let (expected, actual) = (package.vertex_count(), input.sequence.vertex_count());
-    if expected != actual {
-        return Err(EvaluationError::VertexCount {
-            package: expected,
-            sequence: actual,
-        });
-    }
-    let (faces, known) = (&input.sequence.faces, package.faces());
-    if !known.iter().eq(faces.iter().copied()) {
-        let face = faces.iter().zip(known.iter()).take_while(|(a, b)| **a == *b).count();
-        return Err(EvaluationError::Faces { face });
-    }
+    same_mesh(package, input.sequence)?;
     let shape_count = input.sequence.shape_count();
     match input
         .test_shapes
@@ -300,90 +269,50 @@ fn check(input: &EvaluationInput<'_>, package: &CompactView<'_>) -> Result<(), E
     }
 }
 
+/// Errors: a sequence of another mesh than the package's.
+pub(super) fn same_mesh(package: &CompactView<'_>, sequence: &MeshSequence) -> Result<(), EvaluationError> {
+    let (expected, actual) = (package.vertex_count(), sequence.vertex_count());
+    if expected != actual {
+        return Err(EvaluationError::VertexCount {
+            package: expected,
+            sequence: actual,
+        });
+    }
+    let (faces, known) = (&sequence.faces, package.faces());
+    if !known.iter().eq(faces.iter().copied()) {
+        let face = faces.iter().zip(known.iter()).take_while(|(a, b)| **a == *b).count();
+        return Err(EvaluationError::Faces { face });
+    }
+    Ok(())
+}
+
 /// What all shapes share.
 struct Bench<'b> {
-    surface: Surface,
-    areas: Vec<f64>,
-    scaler: FeatureScaler,
-    system: PoissonSystem,
-    decoder: FeatureDecoder,
-    basis: Basis<'b>,
+    reader: &'b ShapeReader<'b>,
+    fit: GradientFit<'b>,
+    encoder: Encoder<'b>,
+    projection: &'b FeatureProjection<'b>,
+    basis: &'b Basis<'b>,
     layout: WorkspaceLayout,
 }
 
-impl<'b> Bench<'b> {
-    fn new(package: &CompactView<'_>, baked: &'b [u8]) -> Result<Self, EvaluationError> {
-        let surface = Surface::of_package(package);
-        let areas = surface.topology.vertex_areas(&surface.rest);
-        let scaler = FeatureScaler {
-            rotation_scale: package.rotation_scale(),
-            stretch_scale: package.stretch_scale(),
-        };
-        let anchor = package.anchor_vertex() as usize;
-        let system = PoissonSystem::new(&surface.topology, &surface.weights, &surface.rest, anchor)?;
-        let decoder = FeatureDecoder::new(&BakedView::open(baked)?);
-        let basis = Basis::open(baked)?;
-        let layout = WorkspaceLayout::for_basis(&basis);
-        Ok(Self {
-            surface,
-            areas,
-            scaler,
-            system,
-            decoder,
-            basis,
-            layout,
-        })
-    }
-
-    fn projection(&self) -> FeatureProjection<'_> {
-        let metric = FeatureMetric::new(&self.system, self.scaler.scales(), &self.areas);
-        FeatureProjection::new(&self.decoder, metric)
-    }
-
-    fn measure(
-        &self,
-        fit: &GradientFit<'_>,
-        encoder: &StackEncoder<'_>,
-        projection: &FeatureProjection<'_>,
-        shape: usize,
-        positions: &[[f32; 3]],
-    ) -> Result<ShapeResult, EvaluationError> {
-        let features = self.features(fit, positions);
+impl Bench<'_> {
+    fn measure(&self, shape: usize, positions: &[[f32; 3]]) -> Result<ShapeResult, EvaluationError> {
+        let features = self.reader.features(&self.fit, positions);
         let mut memory = vec![0; self.layout.unaligned_bytes()];
-        let mut player = Player::new(&self.basis, Workspace::new(&self.basis, &mut memory)?);
+        let mut player = Player::new(self.basis, Workspace::new(self.basis, &mut memory)?);
         let fail = |source| EvaluationError::Play { shape, source };
-        let encoding = encoder.encode(&features);
-        let linear_weights = projection.linear_weights(&features);
-        let feature_weights = projection.weights(&features, linear_weights.clone());
+        let encoding = self.encoder.encode(&features);
+        let start = self.encoder.start_of_projection(&encoding.weights);
+        let feature_weights = self.projection.weights(&features, start);
         let position_weights = project_positions(&mut player, positions, feature_weights.clone()).map_err(fail)?;
         Ok(ShapeResult {
             encoder: player.play(&encoding.weights).map_err(fail)?.to_vec(),
-            linear_encoder: player.play(&linear_weights).map_err(fail)?.to_vec(),
             feature_projection: player.play(&feature_weights).map_err(fail)?.to_vec(),
             position_projection: player.play(&position_weights).map_err(fail)?.to_vec(),
             round_trip: player.reconstruct(&features).map_err(fail)?.to_vec(),
             position_weights,
-            missed: self.missed(&encoding, &linear_weights, &features),
+            encoding,
         })
-    }
-
-    /// Features of a shape brought near the reference, network units. Shape: `[V]`.
-    fn features(&self, fit: &GradientFit<'_>, positions: &[[f32; 3]]) -> Vec<[f32; FEATURE_COUNT]> {
-        let wide = widened(positions);
-        let motion = RigidMotion::onto(&self.surface.rest, &wide);
-        let aligned: Vec<[f64; 3]> = wide.iter().map(|&p| motion.apply(p)).collect();
-        self.scaler
-            .to_network(&features_of_shape(&self.surface.topology, fit, &aligned))
-    }
-
-    fn missed(&self, encoding: &Encoding, linear_weights: &[f64], features: &[[f32; FEATURE_COUNT]]) -> Missed {
-        let decoded = self.decoder.decode_all(linear_weights);
-        let pairs = features.as_flattened().iter().zip(decoded.as_flattened());
-        Missed {
-            energy: encoding.energy,
-            one_level: encoding.root_residual_energy,
-            two_level: encoding.residual_energy,
-            linear: pairs.map(|(&x, y)| (f64::from(x) - y).powi(2)).sum(),
-        }
     }
 }

@@ -1,13 +1,14 @@
 //! Weights by least squares in feature space, through the folded decoder's tanh (method section 3, number 2).
 
-use half::f16;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use sinew_formats::package::{BakedView, FEATURE_COUNT};
+use sinew_formats::package::{CompactView, FEATURE_COUNT};
 
 use super::descent::{DescentSettings, LeastSquares, NormalEquations, descend};
-use super::feature_metric::{FeatureMetric, squared_length};
 use super::position_projection::gram_matrix;
+use crate::components::fields::blends_of;
+use crate::features::metric::{FeatureMetric, squared_length};
+use crate::mesh::topology::Topology;
 
 /// Converges in 3 to 6 steps from weights near the answer; the rest is for shapes far from training.
 const DESCENT: DescentSettings = DescentSettings {
@@ -36,18 +37,18 @@ struct Entry {
 }
 
 impl FeatureDecoder {
-    /// Gathers a baked package by vertex.
-    pub fn new(package: &BakedView<'_>) -> Self {
-        let (exact, vertex_count) = (package.exact(), package.vertex_count());
-        let mut rows: Vec<Vec<Entry>> = vec![Vec::new(); vertex_count];
-        for entry in exact.entries() {
-            let component = package.component(entry.component);
-            let value = entry.values.map(|b| f16::from_bits(b).to_f32() * component.value_scale);
-            rows[package.vertex_from_lane()[entry.lane] as usize].push(Entry {
-                component: entry.component as u32,
-                block: component.block,
-                value,
-            });
+    /// Folds and gathers a compact package by vertex, without the rounding of a baked one. `topology` is the package's.
+    pub fn new(package: &CompactView<'_>, topology: &Topology) -> Self {
+        let mut rows: Vec<Vec<Entry>> = vec![Vec::new(); package.vertex_count()];
+        let blends = blends_of(package, topology);
+        for (k, (component, blend)) in package.components().zip(blends).enumerate() {
+            for (&v, value) in blend.vertices.iter().zip(&blend.sums) {
+                rows[v as usize].push(Entry {
+                    component: k as u32,
+                    block: component.block,
+                    value: value.map(|x| x as f32),
+                });
+            }
         }
         let mut offsets = vec![0];
         for row in &rows {
@@ -55,7 +56,7 @@ impl FeatureDecoder {
         }
         let biases = package
             .blocks()
-            .map(|block| block.bias.map(|b| (f64::from(b), f64::from(b).tanh())))
+            .map(|block| block.decoder.bias.map(|b| (f64::from(b), f64::from(b).tanh())))
             .collect();
         Self {
             component_count: package.component_count(),
@@ -98,6 +99,19 @@ impl FeatureDecoder {
         (0..self.offsets.len() - 1)
             .map(|v| self.decode(v, weights, |_, _| ()))
             .collect()
+    }
+
+    /// `J^T force`, J the derivative of all features at weights of 0. Shapes: `force` `[V]`; the answer `[K]`.
+    pub fn pull_at_rest(&self, force: &[[f64; FEATURE_COUNT]]) -> Vec<f64> {
+        let rest = vec![0.0; self.component_count];
+        let mut pull = rest.clone();
+        for (v, force) in force.iter().enumerate() {
+            self.decode(v, &rest, |entry, slope| {
+                let derivative = core::array::from_fn(|c| slope[c] * f64::from(entry.value[c]));
+                pull[entry.component as usize] += dot(&derivative, force);
+            });
+        }
+        pull
     }
 
     /// K.
@@ -154,16 +168,48 @@ impl<'a> FeatureProjection<'a> {
         }
     }
 
-    /// Weights in one pass, without a search: least squares of the decoder made linear at the reference, in the metric of
-    /// [`Self::weights`] (linear in the features but for how much this shape's positions count). Zeros where nothing can be
-    /// solved. Shapes: `features` `[V]`, source order; the answer `[K]`.
-    pub fn linear_weights(&self, features: &[[f32; FEATURE_COUNT]]) -> Vec<f64> {
-        let mut misfit = self.misfit(features);
-        let Ok(equations) = misfit.linearise(&vec![0.0; self.decoder.component_count]);
-        match equations.step(DESCENT.ridge) {
-            Some(weights) => weights.iter().copied().collect(),
-            None => vec![0.0; self.decoder.component_count],
+    /// What it projects onto.
+    pub fn decoder(&self) -> &'a FeatureDecoder {
+        self.decoder
+    }
+
+    /// What it projects in.
+    pub fn metric(&self) -> &FeatureMetric<'a> {
+        &self.metric
+    }
+
+    /// `J^T M J` of the whole decoder at weights of 0, in the metric of this weight of positions. Shape: `[K][K]`.
+    pub fn normal_matrix_at_rest(&self, position_weight: f64) -> DMatrix<f64> {
+        let mut matrix = self.feature_matrix(&vec![0.0; self.decoder.component_count], |_, _, _| ());
+        matrix += &self.position_gram * position_weight;
+        matrix.fill_upper_triangle_with_lower_triangle();
+        matrix
+    }
+
+    /// The part of features in `J^T M J` at `weights`, lower triangle; shows `visit` each vertex' components and their derivatives.
+    /// Rows are short (a vertex sees a handful of components), so the Jacobian is used vertex by vertex.
+    fn feature_matrix(
+        &self,
+        weights: &[f64],
+        mut visit: impl FnMut(usize, usize, &[f64; FEATURE_COUNT]),
+    ) -> DMatrix<f64> {
+        let component_count = self.decoder.component_count;
+        let mut matrix = DMatrix::zeros(component_count, component_count);
+        let mut row: Vec<(usize, [f64; FEATURE_COUNT])> = Vec::new();
+        for (v, area) in self.metric.areas().iter().enumerate() {
+            row.clear();
+            self.decoder.decode(v, weights, |entry, slope| {
+                let derivative = core::array::from_fn(|c| slope[c] * f64::from(entry.value[c]));
+                row.push((entry.component as usize, derivative));
+            });
+            for (n, (k, derivative)) in row.iter().enumerate() {
+                visit(v, *k, derivative);
+                for (l, other) in &row[..=n] {
+                    matrix[(*k, *l)] += area * dot(derivative, other);
+                }
+            }
         }
+        matrix
     }
 
     fn misfit(&self, features: &[[f32; FEATURE_COUNT]]) -> FeatureMisfit<'_> {
@@ -176,7 +222,7 @@ impl<'a> FeatureProjection<'a> {
         }
     }
 
-    /// Weights that bring `|X - Xhat(z)|` of the metric down, from `start` ([`Self::linear_weights`], or any).
+    /// Weights that bring `|X - Xhat(z)|` of the metric down, from `start` (an encoder's, or any).
     /// Shapes: `features` `[V]`, source order; `start` `[K]`. Stretch counts as it stands in network units, already down-weighted.
     pub fn weights(&self, features: &[[f32; FEATURE_COUNT]], start: Vec<f64>) -> Vec<f64> {
         let mut misfit = self.misfit(features);
@@ -208,45 +254,22 @@ impl LeastSquares for FeatureMisfit<'_> {
     fn cost(&mut self, weights: &[f64]) -> Result<f64, Self::Error> {
         let metric = &self.projection.metric;
         let residual = self.residual(weights);
-        let features: f64 = residual
-            .iter()
-            .zip(metric.areas())
-            .map(|(x, area)| area * x.iter().map(|x| x * x).sum::<f64>())
-            .sum();
-        Ok(features + self.position_weight * squared_length(&metric.displacements(&residual)))
+        Ok(metric.energy(&residual) + self.position_weight * squared_length(&metric.displacements(&residual)))
     }
 
     /// The gradient is exact; the matrix takes what components do to positions as it is at the reference, where the slopes
     /// of tanh are 1, so that no step needs K solves.
     fn linearise(&mut self, weights: &[f64]) -> Result<NormalEquations, Self::Error> {
-        let FeatureProjection {
-            decoder,
-            metric,
-            position_gram,
-        } = self.projection;
-        let component_count = decoder.component_count;
-        let mut matrix = DMatrix::zeros(component_count, component_count);
-        let mut right_hand_side = DVector::zeros(component_count);
+        let metric = &self.projection.metric;
+        let mut right_hand_side = DVector::zeros(weights.len());
         let residual = self.residual(weights);
         let pull = metric.displacements_adjoint(&metric.displacements(&residual));
-        // Rows are short (a vertex sees a handful of components), so the Jacobian is used vertex by vertex.
-        let mut row: Vec<(usize, [f64; FEATURE_COUNT])> = Vec::new();
-        for (v, area) in metric.areas().iter().enumerate() {
-            row.clear();
-            decoder.decode(v, weights, |entry, slope| {
-                let derivative = core::array::from_fn(|c| slope[c] * f64::from(entry.value[c]));
-                row.push((entry.component as usize, derivative));
-            });
-            let force: [f64; FEATURE_COUNT] =
-                core::array::from_fn(|c| area * residual[v][c] + self.position_weight * pull[v][c]);
-            for (n, (k, derivative)) in row.iter().enumerate() {
-                right_hand_side[*k] += dot(derivative, &force);
-                for (l, other) in &row[..=n] {
-                    matrix[(*k, *l)] += area * dot(derivative, other);
-                }
-            }
-        }
-        matrix += position_gram * self.position_weight;
+        let mut matrix = self.projection.feature_matrix(weights, |v, k, derivative| {
+            let force =
+                core::array::from_fn(|c| metric.areas()[v] * residual[v][c] + self.position_weight * pull[v][c]);
+            right_hand_side[k] += dot(derivative, &force);
+        });
+        matrix += &self.projection.position_gram * self.position_weight;
         Ok(NormalEquations {
             matrix,
             right_hand_side,

@@ -1,32 +1,38 @@
 //! Quality, measured through the runtime: E_rms, STED, projections.
 //!
-//! Path of data: compact package and sequence -> weights by encoder, feature projection, position projection -> runtime ->
+//! Path of data: compact package and sequence -> weights by [`Encoder`], feature projection, position projection -> runtime ->
 //! positions -> [`score`] -> [`Evaluation`].
 
 mod ball;
-pub(crate) mod descent;
+pub mod descent;
+mod encode;
 mod encoder;
 mod erms;
 mod evaluation;
-mod feature_metric;
 mod feature_projection;
+mod held_vertices;
 mod player;
 mod position_projection;
 mod scores;
+mod shape_reader;
+mod stack_encoder;
 mod sted;
+mod unrolled_encoder;
 
-pub use encoder::{EncoderSettings, Encoding, MASK_FLOOR, Reading, StackEncoder};
+pub use encode::{EncodeInput, WeightFit, encode};
+pub use encoder::{Encoder, EncoderKind, UnknownEncoder};
 pub use erms::NormalisedPair;
 pub use evaluation::{
     ComponentCounts, Evaluation, EvaluationError, EvaluationInput, MaxPercentageError, Reconstructions, evaluate,
 };
-pub use feature_metric::{FeatureMetric, POSITION_WEIGHT};
 pub use feature_projection::{FeatureDecoder, FeatureProjection};
+pub use held_vertices::{HoldError, drag_to};
 pub use player::{PlayError, Player};
-pub use position_projection::project_positions;
-pub(crate) use position_projection::{gram_matrix, remove_directions, rigid_directions};
+pub use position_projection::{gram_matrix, project_positions};
 pub use scores::{ScoreError, Scores, score};
+pub use stack_encoder::{EncoderSettings, Encoding, MASK_FLOOR, StackEncoder};
 pub use sted::{Sted, sted};
+pub use unrolled_encoder::{EncoderRecord, LAYERS, UnrolledEncoder};
 
 #[cfg(test)]
 mod fold_tests;

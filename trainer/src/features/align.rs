@@ -54,11 +54,11 @@ impl RigidMotion {
 }
 
 /// Every shape aligned to `reference`. Shapes: `[N][V][3]`.
-pub fn align_shapes(reference: &[[f64; 3]], shapes: &[Vec<[f32; 3]>]) -> Vec<AlignedShape> {
+pub fn align_shapes<S: AsRef<[[f32; 3]]> + Sync>(reference: &[[f64; 3]], shapes: &[S]) -> Vec<AlignedShape> {
     shapes
         .par_iter()
         .map(|shape| {
-            let positions = widened(shape);
+            let positions = widened(shape.as_ref());
             let motion = RigidMotion::onto(reference, &positions);
             AlignedShape {
                 positions: positions.into_iter().map(|p| motion.apply(p)).collect(),

@@ -1,9 +1,10 @@
-//! Tests on real sequences: the published oracle and the round trip from shapes to features and back. They need
-//! `SINEW_DATA`, and say so where it is not set.
+//! Tests on real sequences, in the folder that `SINEW_DATA` names: the published oracle and the round trip from shapes to
+//! features and back.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use nalgebra::{Matrix3, Vector3};
+use sinew_interchange::{Choice, MeshSequence, read_sequence};
 
 use super::acap::{AcapFeatures, inconsistent_edge_count};
 use super::align::{RigidMotion, align_shapes, widened};
@@ -12,80 +13,20 @@ use super::reconstruct::{PoissonSystem, choose_anchor};
 use crate::mesh::cotangent::EdgeWeights;
 use crate::mesh::topology::Topology;
 
-/// Shapes of one connectivity.
-pub(crate) struct Sequence {
-    pub(crate) faces: Vec<[u32; 3]>,
-    pub(crate) shapes: Vec<Vec<[f32; 3]>>,
+fn data_folder() -> PathBuf {
+    std::env::var_os("SINEW_DATA")
+        .expect("SINEW_DATA names the folder with real sequences")
+        .into()
 }
 
-fn data_folder() -> Option<PathBuf> {
-    let folder = std::env::var_os("SINEW_DATA").map(PathBuf::from);
-    if folder.is_none() {
-        println!("skipped: SINEW_DATA is not set");
-    }
-    folder
-}
-
-/// `positions.npy` and `faces.npy` of a folder in `SINEW_DATA`.
-pub(crate) fn read_sequence(name: &str) -> Option<Sequence> {
-    let folder = data_folder()?.join(name);
-    let (shape, positions) = read_npy(&folder.join("positions.npy"), "<f4", f32::from_le_bytes);
-    let (_, faces) = read_npy(&folder.join("faces.npy"), "<u4", u32::from_le_bytes);
-    let shapes = positions
-        .as_chunks::<3>()
-        .0
-        .chunks(shape[1])
-        .map(<[[f32; 3]]>::to_vec)
-        .collect();
-    Some(Sequence {
-        faces: faces.as_chunks::<3>().0.to_vec(),
-        shapes,
-    })
-}
-
-/// Shape and values of a C-ordered array of four-byte numbers.
-fn read_npy<T>(path: &Path, kind: &str, from_bytes: fn([u8; 4]) -> T) -> (Vec<usize>, Vec<T>) {
-    let bytes = std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-    let header_end = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
-    let header = String::from_utf8_lossy(&bytes[10..header_end]);
-    assert!(
-        header.contains(kind) && header.contains("False"),
-        "{}: {header}",
-        path.display()
-    );
-    let (_, shape) = header.split_once("'shape': (").expect("a shape");
-    let (shape, _) = shape.split_once(')').expect("a closed shape");
-    let shape = shape.split(',').filter_map(|n| n.trim().parse().ok()).collect();
-    (
-        shape,
-        bytes[header_end..]
-            .as_chunks::<4>()
-            .0
-            .iter()
-            .map(|word| from_bytes(*word))
-            .collect(),
-    )
-}
-
-/// Vertices (at f32, as sequences and the published program have them) and triangles of a plain OBJ file.
-fn read_obj(path: &Path) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
-    let text = std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-    let (mut positions, mut faces) = (Vec::new(), Vec::new());
-    for line in text.lines() {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        match words[..] {
-            ["v", x, y, z] => positions.push([x, y, z].map(|word| word.parse().expect("a number"))),
-            ["f", a, b, c] => faces.push([a, b, c].map(|word| {
-                let index = word.split('/').next().unwrap_or(word);
-                index.parse::<u32>().expect("an index") - 1
-            })),
-            _ => {}
-        }
-    }
-    (positions, faces)
+/// A folder in `SINEW_DATA`.
+fn read(name: &str) -> MeshSequence {
+    let read = read_sequence(&data_folder().join(name), &Choice::default(), &mut |_, _| {});
+    read.expect("the data are sound").sequence
 }
 
 #[test]
+#[ignore = "needs SINEW_DATA, a folder of real sequences"]
 fn features_equal_the_original_authors_program() {
     /// The published files have six significant digits, so half a unit of the fifth decimal for values in [1, 10), and a
     /// little for the program's own rounding.
@@ -94,13 +35,9 @@ fn features_equal_the_original_authors_program() {
     /// gradient whose published stretch equals ours: the file's own error.
     const OFF_IN_THE_FILE: usize = 2;
     const OFF_BY: f64 = 1e-4;
-    let Some(folder) = data_folder().map(|folder| folder.join("acap_oracle")) else {
-        return;
-    };
-    let (_, faces) = read_obj(&folder.join("1.obj"));
-    let shapes: Vec<Vec<[f64; 3]>> = (1..=3)
-        .map(|n| widened(&read_obj(&folder.join(format!("{n}.obj"))).0))
-        .collect();
+    let folder = data_folder().join("acap_oracle");
+    let sequence = read("acap_oracle");
+    let shapes: Vec<Vec<[f64; 3]>> = sequence.shapes.iter().map(widened).collect();
     let rest = &shapes[0];
     let published = |name: &str| -> Vec<Vec<f64>> {
         let text = std::fs::read_to_string(folder.join(name)).expect("the published features");
@@ -113,7 +50,7 @@ fn features_equal_the_original_authors_program() {
             .collect()
     };
     let (logarithms, stretches) = (published("LOGRNEW_withopt_GT.txt"), published("S_withopt_GT.txt"));
-    let topology = Topology::new(&faces, rest);
+    let topology = Topology::new(&sequence.faces, rest);
     let settings = FeatureSettings {
         weighting: Weighting::Published,
         ..FeatureSettings::default()
@@ -176,10 +113,11 @@ struct RoundTrip {
 
 /// Aligned shapes -> features -> solve, against the shapes. E_rms (method section 4) with a bounding ball about the middle
 /// of the vertices' box, pulled in until it is the least one to four digits.
-fn round_trip(sequence: &Sequence, settings: &FeatureSettings) -> RoundTrip {
+fn round_trip(sequence: &MeshSequence, settings: &FeatureSettings) -> RoundTrip {
     let rest = widened(&sequence.shapes[0]);
     let topology = Topology::new(&sequence.faces, &rest);
-    let shapes: Vec<_> = align_shapes(&rest, &sequence.shapes)
+    let shapes: Vec<_> = sequence.shapes.iter().collect();
+    let shapes: Vec<_> = align_shapes(&rest, &shapes)
         .into_iter()
         .map(|shape| shape.positions)
         .collect();
@@ -229,13 +167,13 @@ fn bounding_radius(points: &[[f64; 3]]) -> f64 {
 }
 
 #[test]
+#[ignore = "needs SINEW_DATA, a folder of real sequences"]
 fn a_gallop_survives_the_round_trip() {
     /// What the features alone may lose of the paper's own sequence.
     const FLOOR: f64 = 0.7;
     /// Of 1.2 million edges over the 49 shapes; folded ears and hooves keep 90.
     const WRAPPED_EDGES: usize = 200;
-    let Some(horse) = read_sequence("horse") else { return };
-    let result = round_trip(&horse, &FeatureSettings::default());
+    let result = round_trip(&read("horse"), &FeatureSettings::default());
     println!(
         "horse: E_rms {:.4}, {} wrapped edges, {:.2} s",
         result.e_rms, result.wrapped_edges, result.seconds
@@ -249,17 +187,16 @@ fn a_gallop_survives_the_round_trip() {
 }
 
 #[test]
+#[ignore = "needs SINEW_DATA, a folder of real sequences"]
 fn every_sequence_survives_the_round_trip() {
     /// Enough of each to see what the features lose, few enough to be quick.
     const SHAPE_COUNT: usize = 4;
     /// The worst measured is a coarse walker of few, large triangles.
     const FLOOR: f64 = 4.0;
     for name in SEQUENCES {
-        let Some(mut sequence) = read_sequence(name) else {
-            return;
-        };
+        let mut sequence = read(name);
         let stride = sequence.shapes.len().div_ceil(SHAPE_COUNT);
-        sequence.shapes = sequence.shapes.into_iter().step_by(stride).collect();
+        sequence.shapes = sequence.shapes.iter().step_by(stride).map(<[_]>::to_vec).collect();
         for (weighting, normal_weight) in [
             (Weighting::Refined, 1.0),
             (Weighting::Refined, 0.01),

@@ -54,6 +54,8 @@ impl Default for FeatureSettings {
 #[derive(Debug)]
 pub struct GradientFit<'t> {
     topology: &'t Topology,
+    /// Whether a ring entry is left out of the fit: a bridge, unless the vertex has nothing else. Shape: that of [`Topology::ring`].
+    left_out: Vec<bool>,
     /// `w_ij A_i^-1 (r_j - r_i)`, A the ring's moments. Shape: that of [`Topology::ring`].
     spokes: Vec<Vector3<f64>>,
     /// The same for the normal spoke, times its length in mean spokes. Shape: `[V]`.
@@ -70,23 +72,25 @@ impl<'t> GradientFit<'t> {
     pub fn new(topology: &'t Topology, rest: &[[f64; 3]], settings: &FeatureSettings) -> Self {
         let weights = spoke_weights(topology, rest, settings.weighting);
         let rest_normals = vertex_normals(topology, rest, settings.weighting);
+        let left_out = bridges_beside_faces(topology);
         let mut spokes = vec![Vector3::zeros(); topology.ring.len()];
         let mut normals = vec![Vector3::zeros(); topology.vertex_count];
         let mut determined = vec![false; topology.vertex_count];
         let mut inverses = vec![Matrix3::zeros(); topology.vertex_count];
         for v in 0..topology.vertex_count {
             let entries = topology.entries_of(v);
-            let count = entries.len().max(1) as f64;
+            let fitted = || entries.clone().filter(|&entry| !left_out[entry]);
+            let count = fitted().count().max(1) as f64;
             let (length, weight) = match settings.weighting {
                 Weighting::Cotangent | Weighting::Refined => (
                     1.0,
-                    settings.normal_weight * weights[entries.clone()].iter().sum::<f64>() / count,
+                    settings.normal_weight * fitted().map(|entry| weights[entry]).sum::<f64>() / count,
                 ),
                 Weighting::Published => (PUBLISHED_NORMAL_LENGTH, 1.0),
             };
-            let normal = rest_normals[v] * (length * mean_spoke(topology, rest, v));
+            let normal = rest_normals[v] * (length * mean_spoke(topology, &left_out, rest, v));
             let mut moments = normal * normal.transpose() * weight;
-            for entry in entries.clone() {
+            for entry in fitted() {
                 let spoke = spoke(topology, rest, v, entry);
                 moments += spoke * spoke.transpose() * weights[entry];
             }
@@ -95,7 +99,7 @@ impl<'t> GradientFit<'t> {
             };
             // A loose vertex has bridges alone: what its neighbours do says more than they.
             determined[v] = rest_normals[v] != Vector3::zeros();
-            for entry in entries {
+            for entry in fitted() {
                 spokes[entry] = inverse * spoke(topology, rest, v, entry) * weights[entry];
             }
             normals[v] = inverse * normal * (weight * length);
@@ -110,6 +114,7 @@ impl<'t> GradientFit<'t> {
             .flatten();
         GradientFit {
             topology,
+            left_out,
             spokes,
             normals,
             undetermined,
@@ -124,7 +129,7 @@ impl<'t> GradientFit<'t> {
         let shape_normals = vertex_normals(self.topology, shape, self.weighting);
         let mut gradients: Vec<Matrix3<f64>> = (0..self.topology.vertex_count)
             .map(|v| {
-                let normal = shape_normals[v] * mean_spoke(self.topology, shape, v);
+                let normal = shape_normals[v] * mean_spoke(self.topology, &self.left_out, shape, v);
                 let mut gradient = normal * self.normals[v].transpose();
                 for entry in self.topology.entries_of(v) {
                     gradient += spoke(self.topology, shape, v, entry) * self.spokes[entry].transpose();
@@ -179,10 +184,27 @@ fn spoke(topology: &Topology, positions: &[[f64; 3]], v: usize, entry: usize) ->
     Vector3::from(difference(positions[v], positions[topology.ring[entry] as usize]))
 }
 
-fn mean_spoke(topology: &Topology, positions: &[[f64; 3]], v: usize) -> f64 {
-    let entries = topology.entries_of(v);
-    let count = entries.len().max(1) as f64;
-    entries
+/// Bridges of vertices that have edges of faces too: what hangs on a vertex says nothing of the surface there.
+fn bridges_beside_faces(topology: &Topology) -> Vec<bool> {
+    let mut left_out = vec![false; topology.ring.len()];
+    if topology.bridges.is_empty() {
+        return left_out;
+    }
+    for v in 0..topology.vertex_count {
+        let is_bridge = |entry: usize| topology.is_bridge(v as u32, topology.ring[entry]);
+        if topology.entries_of(v).any(|entry| !is_bridge(entry)) {
+            topology
+                .entries_of(v)
+                .for_each(|entry| left_out[entry] = is_bridge(entry));
+        }
+    }
+    left_out
+}
+
+fn mean_spoke(topology: &Topology, left_out: &[bool], positions: &[[f64; 3]], v: usize) -> f64 {
+    let entries = || topology.entries_of(v).filter(|&entry| !left_out[entry]);
+    let count = entries().count().max(1) as f64;
+    entries()
         .map(|entry| spoke(topology, positions, v, entry).norm())
         .sum::<f64>()
         / count

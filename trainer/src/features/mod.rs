@@ -5,11 +5,12 @@ pub mod acap;
 pub mod align;
 mod branches;
 pub mod gradient;
+pub mod metric;
 pub mod polar;
 pub mod reconstruct;
 mod refine;
+pub mod rigid;
 pub mod scaler;
-pub mod store;
 
 #[cfg(test)]
 pub(crate) mod data;

@@ -22,9 +22,14 @@ pub struct FeatureScaler {
 
 impl FeatureScaler {
     /// Scales that bring the greatest rotation component of `shapes` to `rotation_reach` (at most 0.95: the paper's), and
-    /// let a stretch count `stretch_weight` times a rotation of as many radians. The stretch scale is raised where
-    /// stretches would leave 0.95.
-    pub fn fit(features: &AcapFeatures, shapes: &[usize], rotation_reach: f64, stretch_weight: f64) -> FeatureScaler {
+    /// let a stretch count `stretch_weight` times a rotation of as many radians; without a weight the greatest stretch is
+    /// brought to `rotation_reach` too. The stretch scale is raised where stretches would leave 0.95.
+    pub fn fit(
+        features: &AcapFeatures,
+        shapes: &[usize],
+        rotation_reach: f64,
+        stretch_weight: Option<f64>,
+    ) -> FeatureScaler {
         let greatest = shapes
             .iter()
             .map(|&m| Greatest::of(&features.shapes[m]))
@@ -33,10 +38,12 @@ impl FeatureScaler {
     }
 
     /// The same of what was found over all shapes.
-    pub fn of_greatest(greatest: Greatest, rotation_reach: f64, stretch_weight: f64) -> FeatureScaler {
+    pub fn of_greatest(greatest: Greatest, rotation_reach: f64, stretch_weight: Option<f64>) -> FeatureScaler {
         let Greatest { rotation, stretch } = greatest;
-        let rotation_scale = (rotation / rotation_reach.clamp(f64::MIN_POSITIVE, VALUE_LIMIT)).max(SCALE_FLOOR);
-        let stretch_scale = (rotation_scale / stretch_weight)
+        let reach = rotation_reach.clamp(f64::MIN_POSITIVE, VALUE_LIMIT);
+        let rotation_scale = (rotation / reach).max(SCALE_FLOOR);
+        let stretch_scale = stretch_weight
+            .map_or(stretch / reach, |weight| rotation_scale / weight)
             .max(stretch / VALUE_LIMIT)
             .max(SCALE_FLOOR);
         FeatureScaler {
@@ -127,7 +134,7 @@ mod tests {
     #[test]
     fn there_and_back() {
         let features = features(2.0, 0.3);
-        let scaler = FeatureScaler::fit(&features, &[0, 1], 0.4, 0.1);
+        let scaler = FeatureScaler::fit(&features, &[0, 1], 0.4, Some(0.1));
         for shape in &features.shapes {
             let values = scaler.to_network(shape);
             assert!(
@@ -151,11 +158,18 @@ mod tests {
     }
 
     #[test]
+    fn scaled_apart_rotations_and_stretches_both_fill_the_range() {
+        let scaler = FeatureScaler::fit(&features(2.0, 0.1), &[1], 0.95, None);
+        assert!((f64::from(scaler.rotation_scale) - 2.0 / 0.95).abs() < 1e-6);
+        assert!((f64::from(scaler.stretch_scale) - 0.1 / 0.95).abs() < 1e-6);
+    }
+
+    #[test]
     fn stretches_stay_in_range_and_scales_stay_positive() {
-        let scaler = FeatureScaler::fit(&features(0.01, 3.0), &[1], 0.95, 1.0);
+        let scaler = FeatureScaler::fit(&features(0.01, 3.0), &[1], 0.95, Some(1.0));
         assert!((f64::from(scaler.stretch_scale) - 3.0 / 0.95).abs() < 1e-6);
-        let constant = FeatureScaler::fit(&features(0.0, 0.0), &[0, 1], 0.4, 0.1);
+        let constant = FeatureScaler::fit(&features(0.0, 0.0), &[0, 1], 0.4, Some(0.1));
         assert!(constant.rotation_scale > 0.0 && constant.stretch_scale > 0.0);
-        assert_eq!(FeatureScaler::fit(&features(1.0, 1.0), &[], 0.4, 0.1), constant);
+        assert_eq!(FeatureScaler::fit(&features(1.0, 1.0), &[], 0.4, Some(0.1)), constant);
     }
 }

@@ -2,23 +2,26 @@
 //! writing one is here, so that tests and other programs can do it too.
 //!
 //! Path of data: what the user keeps of older packages, [`mod@review`] (which shapes are of use) -> [`prepare`] (topology,
-//! features, distances) -> choose how to mix and where to start, by held-out shapes ([`hold_out`]) -> fit, and fit again on
-//! all shapes where they are few -> [`mod@refine`] for positions -> [`package`] (extract, prune, measure).
+//! features, distances) -> choose how to mix, by held-out shapes ([`hold_out`]) -> the closed-form start, and steps of the optimiser
+//! where they are asked for -> [`mod@refine`] -> [`package`] (extract, prune, measure).
 
 pub mod hold_out;
 pub mod package;
+mod pieces;
 pub mod prepare;
+mod prior;
 pub mod refine;
 pub mod review;
 pub mod run_folder;
 mod stages;
+pub mod trial;
 
 use core::time::Duration;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use sinew_formats::interchange::MeshSequence;
 use sinew_formats::package::{AlignedBytes, CompactView, Quality, WriteError};
+use sinew_interchange::MeshSequence;
 
 use crate::bake::BakeError;
 use crate::components::kept::{self, KeepError, row_behind};
@@ -216,6 +219,12 @@ pub fn learn(
     let mut config = config.clone();
     config.mixes = plan.mixes.clone();
 
+    if config.fit.steps == 0 {
+        let outcome = stages::start_alone(&prepared, &config, &plan, reporter)?;
+        let mut learned = finish(&prepared, &config, sequence, train_shapes, outcome, 0, reporter)?;
+        learned.stop_reason = "the closed form, refined".to_owned();
+        return Ok(learned);
+    }
     reporter.stage("position modes", 1);
     let modes = position_modes(
         &prepared.system,
@@ -245,7 +254,7 @@ pub fn learn(
                 },
                 &held_out,
                 FitBounds {
-                    steps: config.fit.steps,
+                    steps: stages::planned_steps(&prepared, &config, &fit_shapes),
                     budget,
                     name: "training",
                     file: "first.checkpoint",
@@ -346,7 +355,7 @@ fn finish(
         component_count,
         removed_count,
         config: config.clone(),
-        validation: hold_out::first_and_best(&outcome.history),
+        validation: hold_out::first_and_best(&outcome.history).or(outcome.best_validation.map(|error| (error, error))),
         history: outcome.history,
         steps_run: quality.steps_run as usize,
         stop_reason: in_words(outcome.stop_reason).to_owned(),

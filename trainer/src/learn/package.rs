@@ -2,19 +2,19 @@
 //! measured through the runtime, then the bytes.
 
 use rayon::prelude::*;
-use sinew_formats::package::{
-    AlignedBytes, BakedView, CompactView, OpenError, Provenance, Quality, WriteError, write_compact,
-};
+use sinew_formats::package::{AlignedBytes, CompactView, OpenError, Provenance, Quality, WriteError, write_compact};
 use sinew_runtime::{Basis, Workspace, WorkspaceError, WorkspaceLayout};
 
+use super::pieces::place_pieces;
 use super::prepare::Prepared;
-use super::stages::mixer;
-use crate::bake::{BakeError, Surface, bake};
+use super::prior::weight_prior;
+use super::trial::Trial;
+use crate::bake::BakeError;
 use crate::components::extract::LearnedBasis;
 use crate::components::painted::{painted_names, with_those_below};
 use crate::components::rename::{RenameError, new_names, places, renamed};
 use crate::config::TrainConfig;
-use crate::evaluate::{FeatureDecoder, FeatureMetric, FeatureProjection, PlayError, Player, ScoreError, StackEncoder};
+use crate::evaluate::{PlayError, Player, ScoreError, UnknownEncoder};
 use crate::network::weights::StackWeights;
 
 /// Why a learned basis cannot be packaged or measured.
@@ -33,6 +33,9 @@ pub enum PackageError {
     /// What was just written does not open.
     #[error("the package does not open: {0}")]
     Open(#[from] OpenError),
+    /// Its encoder cannot be used.
+    #[error(transparent)]
+    Encoder(#[from] UnknownEncoder),
     /// The runtime has no workspace for it.
     #[error("no workspace for the package: {0}")]
     Workspace(#[from] WorkspaceError),
@@ -121,12 +124,17 @@ pub fn package(
 ) -> Result<(AlignedBytes, usize, usize), PackageError> {
     let all: Vec<usize> = (0..prepared.network.len()).collect();
     let mut basis = draft(prepared, config, weights, &all)?;
-    measure_final_ranges(&mut basis, prepared, config)?;
-    let changes = measure_strengths(&mut basis, config)?;
+    let changes = measure_strengths(&mut basis, prepared, config)?;
     let removed_count = basis.prune(&changes, &config.prune, config.fit.attention);
     basis.order_by_strength();
     // Without the redundant ones the weights of the rest have moved a little.
-    measure_final_ranges(&mut basis, prepared, config)?;
+    measure_ranges(&mut basis, prepared, config, &all)?;
+    let trial = Trial::new(prepared, config, &basis)?;
+    let (pieces, prior) = (
+        place_pieces(prepared, &trial, &basis)?,
+        weight_prior(prepared, &trial, &basis)?,
+    );
+    (basis.pieces, basis.prior) = (pieces, prior);
     let component_count = basis.components().count();
     let numbers: Vec<u32> = train_shapes.iter().map(|&m| m as u32).collect();
     let config_text = config.to_toml();
@@ -164,82 +172,30 @@ const NUMBER_OF_RANGE_MIXES: u64 = 1 << 41;
 /// Mixes whose weights count for the stops of the controls.
 const RANGE_MIXES: usize = 32;
 
-/// The stops of every control: the least and greatest weight of the training shapes (of 256, where there are more) and of mixes
-/// of them, 0 included. A handful of poses alone would leave most controls one-sided. While training goes on the encoder finds
-/// the weights, which is quick.
+/// The stops of every control: the least and greatest weight, by the package's encoder, of the training shapes (of 256, where there
+/// are more) and of mixes of them, 0 included. A handful of poses alone would leave most controls one-sided.
 fn measure_ranges(
     basis: &mut LearnedBasis,
     prepared: &Prepared,
     config: &TrainConfig,
     shapes: &[usize],
 ) -> Result<(), PackageError> {
-    let compact = basis.write_draft()?;
-    let view = compact.view()?;
-    let surface = Surface::of_package(&view);
-    let encoder = StackEncoder::new(&view, &surface.topology, config.encoder());
     let mixes = range_mixes(prepared, config, shapes);
-    let shapes = range_shapes(prepared, shapes, &mixes);
-    let codes: Vec<Vec<f64>> = shapes.par_iter().map(|shape| encoder.encode(shape).weights).collect();
-    set_ranges(basis, &codes);
+    let codes = Trial::new(prepared, config, basis)?.encoded(&range_shapes(prepared, shapes, &mixes))?;
+    for (k, component) in basis.components_mut().enumerate() {
+        component.minimum = codes.iter().map(|code| code[k] as f32).fold(0.0, f32::min);
+        component.maximum = codes.iter().map(|code| code[k] as f32).fold(0.0, f32::max);
+    }
     Ok(())
-}
-
-/// The same of what is packaged, weights by the projection that plays shapes best.
-fn measure_final_ranges(
-    basis: &mut LearnedBasis,
-    prepared: &Prepared,
-    config: &TrainConfig,
-) -> Result<(), PackageError> {
-    let all: Vec<usize> = (0..prepared.network.len()).collect();
-    let mixes = range_mixes(prepared, config, &all);
-    let (_, codes) = project(basis, prepared, &range_shapes(prepared, &all, &mixes))?;
-    set_ranges(basis, &codes);
-    Ok(())
-}
-
-/// Weights of `shapes` (each `[V]`, network units) by the feature projection of a basis, and the decoder that they are for.
-pub(super) fn project(
-    basis: &LearnedBasis,
-    prepared: &Prepared,
-    shapes: &[&[[f32; 9]]],
-) -> Result<(FeatureDecoder, Vec<Vec<f64>>), PackageError> {
-    with_projection(basis, prepared, shapes, |projection, shape| {
-        projection.weights(shape, vec![0.0; basis.components().count()])
-    })
-}
-
-/// The same by the linear encoder: the projection's first step, quick enough to judge by while training goes on.
-pub(super) fn encode_linearly(
-    basis: &LearnedBasis,
-    prepared: &Prepared,
-    shapes: &[&[[f32; 9]]],
-) -> Result<Vec<Vec<f64>>, PackageError> {
-    let encode = |projection: &FeatureProjection<'_>, shape: &[[f32; 9]]| projection.linear_weights(shape);
-    Ok(with_projection(basis, prepared, shapes, encode)?.1)
-}
-
-fn with_projection(
-    basis: &LearnedBasis,
-    prepared: &Prepared,
-    shapes: &[&[[f32; 9]]],
-    weights: impl Fn(&FeatureProjection<'_>, &[[f32; 9]]) -> Vec<f64> + Sync,
-) -> Result<(FeatureDecoder, Vec<Vec<f64>>), PackageError> {
-    let compact = basis.write_draft()?;
-    let baked = bake(&compact.view()?)?;
-    let decoder = FeatureDecoder::new(&BakedView::open(&baked)?);
-    let areas: Vec<f64> = prepared.areas.iter().map(|&area| f64::from(area)).collect();
-    let metric = FeatureMetric::new(&prepared.system, prepared.scaler.scales(), &areas);
-    let projection = FeatureProjection::new(&decoder, metric);
-    let codes = shapes.par_iter().map(|shape| weights(&projection, shape)).collect();
-    drop(projection);
-    Ok((decoder, codes))
 }
 
 /// Mixes whose weights count for the stops of the controls. Shape: flat `[n][V][9]`.
 fn range_mixes(prepared: &Prepared, config: &TrainConfig, shapes: &[usize]) -> Vec<f32> {
     match config.mixes.per_step {
         0 => Vec::new(),
-        _ => mixer(prepared, shapes, &config.mixes, config.seed).mixes(NUMBER_OF_RANGE_MIXES, RANGE_MIXES),
+        _ => prepared
+            .mixer(shapes, &config.mixes, config.seed)
+            .mixes(NUMBER_OF_RANGE_MIXES, RANGE_MIXES),
     }
 }
 
@@ -247,7 +203,7 @@ fn range_mixes(prepared: &Prepared, config: &TrainConfig, shapes: &[usize]) -> V
 const RANGE_SHAPES_MAX: usize = 256;
 
 /// Up to `count` of `shapes`, spread evenly.
-fn spread(shapes: &[usize], count: usize) -> impl Iterator<Item = usize> {
+pub(super) fn spread(shapes: &[usize], count: usize) -> impl Iterator<Item = usize> {
     let count = count.min(shapes.len());
     (0..count).map(move |i| shapes[i * shapes.len() / count])
 }
@@ -259,19 +215,15 @@ fn range_shapes<'a>(prepared: &'a Prepared, shapes: &[usize], mixes: &'a [f32]) 
     posed.chain(mixes).collect()
 }
 
-fn set_ranges(basis: &mut LearnedBasis, codes: &[Vec<f64>]) {
-    for (k, component) in basis.components_mut().enumerate() {
-        component.minimum = codes.iter().map(|code| code[k] as f32).fold(0.0, f32::min);
-        component.maximum = codes.iter().map(|code| code[k] as f32).fold(0.0, f32::max);
-    }
-}
-
 /// Plays every component alone at its farther stop. Sets its strength (mean displacement of what it moves, as a share of
 /// the bounding box) and returns the mean change of features that decides on redundancy (paper: I).
-fn measure_strengths(basis: &mut LearnedBasis, config: &TrainConfig) -> Result<Vec<f32>, PackageError> {
-    let compact = basis.write_draft()?;
-    let baked = bake(&compact.view()?)?;
-    let opened = Basis::open(&baked)?;
+fn measure_strengths(
+    basis: &mut LearnedBasis,
+    prepared: &Prepared,
+    config: &TrainConfig,
+) -> Result<Vec<f32>, PackageError> {
+    let trial = Trial::new(prepared, config, basis)?;
+    let opened = Basis::open(trial.baked()?)?;
     let stops: Vec<f64> = basis
         .components()
         .map(|c| f64::from(if c.maximum >= -c.minimum { c.maximum } else { c.minimum }))

@@ -5,23 +5,33 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use rayon::prelude::*;
-use sinew_formats::interchange::{MeshSequence, RenderSurface};
+use sinew_interchange::{MeshSequence, RenderSurface};
 
+use super::package::spread;
 use super::{LearnError, Reporter};
+use crate::components::bends::bend_distances;
 use crate::components::extract::BasisFrame;
 use crate::components::kept::{KeptResponse, claim, network_row};
+use crate::components::mix::{MixSettings, Mixer};
 use crate::components::painted::painted_labels;
-use crate::components::regions::Claims;
+use crate::components::start::Claims;
+use crate::components::symmetry::{MirrorPlane, mirrored_features};
 use crate::config::TrainConfig;
+use crate::evaluate::{EncoderKind, EncoderRecord, LAYERS};
 use crate::features::acap::features_of_shape;
 use crate::features::align::{RigidMotion, widened};
 use crate::features::gradient::GradientFit;
+use crate::features::metric::FeatureMetric;
 use crate::features::reconstruct::{PoissonSystem, choose_anchor};
 use crate::features::scaler::{FeatureScaler, Greatest, deviation};
-use crate::features::store::{MAPPED_FROM_BYTES, ShapeStore};
 use crate::mesh::cotangent::EdgeWeights;
 use crate::mesh::geodesic::HeatMethod;
+use crate::mesh::hanging::hung_by_motion;
 use crate::mesh::topology::Topology;
+use sinew_interchange::{MAPPED_FROM_BYTES, ShapeStore};
+
+/// Training shapes that say what pieces hang on, at most.
+const HANGING_SHAPES_MAX: usize = 32;
 
 /// Displacements below this share of the bounding box are no motion.
 const STILL: f64 = 1e-7;
@@ -46,8 +56,17 @@ pub struct Prepared {
     pub network: Arc<ShapeStore<9>>,
     /// The same shapes as aligned positions. Shape: `[M][V]`.
     pub aligned: ShapeStore<3>,
-    /// Distances from the centres that mixes choose from, longest 1. Shape: `[centres][V]`.
-    pub centre_distances: Vec<Vec<f32>>,
+    /// What is mixed: the shapes, and behind them their mirror images where the reference has a mirror plane and the shapes are
+    /// few. Shape: `[M or 2 M][V][9]`.
+    pub poses: Arc<ShapeStore<9>>,
+    /// Centres that mixes choose from, spread over the surface.
+    pub centres: Vec<usize>,
+    /// The same areas in double precision. Shape: `[V]`.
+    pub wide_areas: Vec<f64>,
+    /// w of the feature metric, of all training shapes together.
+    pub position_weight: f64,
+    /// What packages keep for their encoder; nothing where it is the paper's.
+    pub encoder: Option<EncoderRecord>,
     /// Which vertices belong to painted regions and kept components.
     pub claims: Claims,
     /// Rows of the kept components in network units, of unit length, the last of `claims`. Shape: `[kept][V * 9]`.
@@ -75,10 +94,15 @@ impl Prepared {
         if shapes.is_empty() {
             return Err(LearnError::TooFewShapes { found: 0, needed: 1 });
         }
-        let rest_positions = sequence.shapes[0].clone();
+        let rest_positions = sequence.shapes[0].to_vec();
         let rest = widened(&rest_positions);
         reporter.stage("features", shapes.len() as u64);
-        let topology = Topology::new(&sequence.faces, &rest);
+        let seen = spread(&shapes, HANGING_SHAPES_MAX).map(|m| {
+            let shape = widened(&sequence.shapes[m]);
+            let motion = RigidMotion::onto(&rest, &shape);
+            shape.into_iter().map(|p| motion.apply(p)).collect()
+        });
+        let topology = hung_by_motion(&sequence.faces, &rest, &config.features, seen);
         let weights = EdgeWeights::new(&topology, &rest);
         let fit = GradientFit::new(&topology, &rest, &config.features);
         let read = read_shapes(sequence, &shapes, &rest, &topology, &fit, reporter)?;
@@ -86,7 +110,7 @@ impl Prepared {
         let scaler = FeatureScaler::of_greatest(
             read.greatest,
             config.scaling.rotation_reach,
-            config.scaling.stretch_weight,
+            config.scaling.weight_of_stretch(),
         );
         let (aligned, mut network) = (read.aligned, read.deviations);
         let scales = scaler.scales();
@@ -112,16 +136,24 @@ impl Prepared {
         let heat = HeatMethod::new(&topology, &rest)?;
         let centre_count = config.start.centres.min(topology.vertex_count);
         reporter.stage("distances", 1);
-        let centre_distances = heat
-            .farthest_points(anchor, centre_count)
-            .into_iter()
-            .map(|v| narrowed(heat.normalised_distances(v)))
-            .collect();
+        let centres = heat.farthest_points(anchor, centre_count);
         reporter.advance(1, "");
         if reporter.stop_requested() {
             return Err(LearnError::Stopped);
         }
+        let network = Arc::new(network);
+        let wide_areas = topology.vertex_areas(&rest);
+        let poses = with_mirror_images(&network, &rest, &wide_areas, &topology, reporter);
+        let position_weight = FeatureMetric::new(&system, scales, &wide_areas).common_position_weight(network.iter());
+        let encoder = (config.encoder == EncoderKind::Unrolled).then_some(EncoderRecord {
+            layers: LAYERS,
+            position_weight,
+        });
         Ok(Self {
+            encoder,
+            poses,
+            wide_areas,
+            position_weight,
             aligned,
             rest,
             rest_positions,
@@ -130,8 +162,8 @@ impl Prepared {
             system,
             areas,
             scaler,
-            network: Arc::new(network),
-            centre_distances,
+            network,
+            centres,
             claims,
             kept_rows,
             kept_names: kept.iter().map(|kept| kept.name.clone()).collect(),
@@ -160,6 +192,28 @@ impl Prepared {
         found.as_ref().clone()
     }
 
+    /// The metric that counts what features do to positions.
+    pub fn metric(&self) -> FeatureMetric<'_> {
+        FeatureMetric::new(&self.system, self.scaler.scales(), &self.wide_areas)
+    }
+
+    /// Draws mixes of the given shapes, and of their mirror images where there are some and they are wanted.
+    pub fn mixer(&self, shapes: &[usize], settings: &MixSettings, seed: u64) -> Mixer {
+        let mut shapes = shapes.to_vec();
+        if settings.mirror && self.poses.len() > self.network.len() {
+            shapes.extend(shapes.clone().iter().map(|m| m + self.network.len()));
+        }
+        let distances = bend_distances(
+            &self.topology,
+            &self.rest,
+            &self.poses,
+            &shapes,
+            settings.bend,
+            &self.centres,
+        );
+        Mixer::new(Arc::clone(&self.poses), shapes, distances, settings.clone(), seed)
+    }
+
     /// Up to `count` vertices spread over the surface, the anchor first.
     pub fn spread_vertices(&self, count: usize) -> Vec<usize> {
         self.heat.farthest_points(self.system.anchor(), count)
@@ -175,6 +229,7 @@ impl Prepared {
             rotation_scale: self.scaler.rotation_scale,
             stretch_scale: self.scaler.stretch_scale,
             render: self.render.clone(),
+            encoder: self.encoder,
             kept: self.kept_roots().zip(self.kept_names.iter().cloned()).collect(),
         }
     }
@@ -267,6 +322,50 @@ fn read_shapes(
         deviations,
         greatest: greatest.fold(Greatest::default(), Greatest::or),
     })
+}
+
+/// Most shapes that mirror images are made of: more need none, and would need room.
+const MIRRORED_MAX: usize = 64;
+
+/// Rounds of averaging with the ring that smooth what a mirror image takes from the nearest vertices.
+const MIRROR_SMOOTHING: usize = 1;
+
+fn with_mirror_images(
+    network: &Arc<ShapeStore<9>>,
+    rest: &[[f64; 3]],
+    areas: &[f64],
+    topology: &Topology,
+    reporter: &dyn Reporter,
+) -> Arc<ShapeStore<9>> {
+    if network.len() > MIRRORED_MAX {
+        return Arc::clone(network);
+    }
+    let Some(plane) = MirrorPlane::find(rest, areas, topology) else {
+        return Arc::clone(network);
+    };
+    let normal = plane.normal.into();
+    let images = network.iter().map(|shape| {
+        let mirrored = plane.mirrored.iter().map(|&other| {
+            let x = shape[other as usize].map(f64::from);
+            mirrored_features(&x, normal).map(|x| x as f32)
+        });
+        let mut image: Vec<[f32; 9]> = mirrored.collect();
+        for _ in 0..MIRROR_SMOOTHING {
+            image = (0..image.len())
+                .map(|v| {
+                    let ring = topology.ring_of(v);
+                    let share = 1.0 / (1 + ring.len()) as f32;
+                    core::array::from_fn(|c| {
+                        (image[v][c] + ring.iter().map(|&j| image[j as usize][c]).sum::<f32>()) * share
+                    })
+                })
+                .collect();
+        }
+        image
+    });
+    reporter.notice("the reference is its own mirror image, nearly: mirror images of the shapes are learned from, too");
+    let all: Vec<Vec<[f32; 9]>> = network.iter().map(<[_]>::to_vec).chain(images).collect();
+    Arc::new(ShapeStore::of_shapes(&all))
 }
 
 fn narrowed(values: Vec<f64>) -> Vec<f32> {

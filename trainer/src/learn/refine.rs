@@ -1,9 +1,8 @@
-//! Refining for positions, between the fit and the package: components are fitted anew to the weights that a projection
-//! finds for unseen mixes, in the metric that counts positions, and so on in turns.
+//! Refining, between the fit and the package: components are fitted anew to the weights that the package's encoder reads off
+//! unseen mixes, in the metric that counts positions, and so on in turns.
 //!
-//! The fit asks what the encoder can find, and its gradient is shared with all that the loss asks for besides. Here the
-//! solve itself says which weights suit each mix, and every vertex then answers to the few components that reach it, by
-//! least squares of its own. Supports stay as they are.
+//! The fit's gradient is shared with all that its loss asks for. Here least squares say which weights suit each mix, and every
+//! vertex then answers to the few components that reach it, by least squares of its own. Supports stay as they are.
 
 use core::ops::Range;
 
@@ -12,9 +11,9 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sinew_formats::package::{FEATURE_COUNT, GraphConvRecord};
 
-use super::package::{PackageError, draft, project};
+use super::package::{PackageError, draft};
 use super::prepare::Prepared;
-use super::stages::mixer;
+use super::trial::Trial;
 use super::{LearnError, Reporter};
 use crate::config::TrainConfig;
 use crate::network::weights::StackWeights;
@@ -23,8 +22,7 @@ use crate::network::weights::StackWeights;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RefineSettings {
-    /// Turns of finding weights and fitting components; 0 leaves the components as the fit left them. Projections gain by
-    /// it and the network's encoder loses, for it shares components that no longer serve it first.
+    /// Turns of finding weights and fitting components; 0 leaves the components as the fit left them.
     pub rounds: usize,
     /// Mixes a turn, fresh ones each. Several times the number of components, or they are learned by heart.
     pub samples: usize,
@@ -62,8 +60,8 @@ pub(super) fn refine(
     if rounds == 0 || samples == 0 {
         return Ok(weights);
     }
-    reporter.stage("refining for positions", rounds as u64);
-    let mixer = mixer(prepared, shapes, &config.mixes, config.seed);
+    reporter.stage("refining", rounds as u64);
+    let mixer = prepared.mixer(shapes, &config.mixes, config.seed);
     for round in 0..rounds {
         if reporter.stop_requested() {
             return Err(LearnError::Stopped);
@@ -86,7 +84,9 @@ fn turn(
     let cut = draft(prepared, config, weights, shapes)?;
     cut.put_rows_into(weights);
     let samples: Vec<&[[f32; FEATURE_COUNT]]> = mixes.as_chunks::<FEATURE_COUNT>().0.chunks(vertex_count).collect();
-    let (decoder, codes) = project(&cut, prepared, &samples)?;
+    let trial = Trial::new(prepared, config, &cut)?;
+    let codes = trial.encoded(&samples)?;
+    let decoder = trial.decoder();
     let residuals: Vec<Vec<[f32; FEATURE_COUNT]>> = samples
         .par_iter()
         .zip(&codes)

@@ -2,7 +2,7 @@
 //! should know of the rest. First stage of a training run.
 
 use rayon::prelude::*;
-use sinew_formats::interchange::MeshSequence;
+use sinew_interchange::MeshSequence;
 
 use super::LearnError;
 use super::prepare::moves;
@@ -134,9 +134,8 @@ fn mesh_notices(topology: &Topology) -> Vec<String> {
     let mut notices = Vec::new();
     if findings.piece_count > 1 {
         notices.push(format!(
-            "the mesh has {} separate pieces: {} extra edges tie each to the vertices nearest to it, so that it follows them",
-            findings.piece_count,
-            topology.bridges.len()
+            "the mesh has {} separate pieces: extra edges tie each to what it moves with in the shapes, so that it follows that",
+            findings.piece_count
         ));
     }
     if findings.non_manifold_edge_count > 0 {

@@ -11,6 +11,8 @@ use crate::components::mix::MixSettings;
 pub struct Plan {
     /// How training shapes are mixed.
     pub mixes: MixSettings,
+    /// Held-out E_rms of the start that these mixes make; `None` where nothing was held out.
+    pub held_out_error: Option<f32>,
     /// The fit with held-out shapes, once it is done and another one follows.
     pub first_fit: Option<FirstFit>,
 }

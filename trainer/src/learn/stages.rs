@@ -4,14 +4,17 @@ use core::time::Duration;
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::hold_out::{HeldOut, Judge, encoder_error};
+use super::hold_out::HeldOut;
 use super::prepare::Prepared;
 use super::run_folder::{Plan, RunFolder};
+use super::trial::Trial;
 use super::{LearnError, Reporter, package};
+use crate::components::embedding::Embedding;
 use crate::components::mix::{MixSettings, Mixer};
 use crate::components::random_start::random_start;
 use crate::components::start::{StartInput, closed_form_start};
 use crate::config::{StartKind, TrainConfig};
+use crate::network::activation::Activation;
 use crate::network::weights::StackWeights;
 use crate::training::data::{BatchSource, ShapesSource};
 use crate::training::fit::{FitInput, FitOutcome, FitProgress, FitSettings, Flow, StopReason, fit};
@@ -33,25 +36,13 @@ pub(super) struct FitBounds {
     pub(super) file: &'static str,
 }
 
-/// The mixes of the chosen shapes.
-pub(super) fn mixer(prepared: &Prepared, shapes: &[usize], settings: &MixSettings, seed: u64) -> Mixer {
-    Mixer::new(
-        Arc::clone(&prepared.network),
-        shapes.to_vec(),
-        prepared.centre_distances.clone(),
-        settings.clone(),
-        seed,
-    )
-}
-
 /// Numbers of the mixes that the start sees, far from those that batches see.
 const START_MIXES: u64 = 1 << 40;
 
 /// Number of the first mix that seeds are chosen by, and how many: a dozen leave the choice to chance.
 const SEED_MIXES: (u64, usize) = (1 << 42, 48);
 
-/// The start. The closed form's faint parts are cut, and of `seed_count` seeds it is the one that plays unseen mixes best,
-/// by the network's encoder: how well levels share out a shape is what starts differ in, and least squares hides it.
+/// The start. The closed form's faint parts are cut, and of `seed_count` seeds it is the one that plays unseen mixes best.
 fn start(
     prepared: &Prepared,
     config: &TrainConfig,
@@ -63,7 +54,9 @@ fn start(
     if config.start.kind == StartKind::Random {
         return Ok(random_start(prepared.rest.len(), &config.components, config.seed));
     }
-    let unseen = mixer(prepared, shapes, mixes, config.seed).mixes(SEED_MIXES.0, SEED_MIXES.1);
+    let unseen = prepared
+        .mixer(shapes, mixes, config.seed)
+        .mixes(SEED_MIXES.0, SEED_MIXES.1);
     let unseen: Vec<&[[f32; 9]]> = unseen.as_chunks::<9>().0.chunks(prepared.rest.len()).collect();
     let mut best: Option<(f32, StackWeights)> = None;
     for i in 0..seed_count as u64 {
@@ -75,7 +68,7 @@ fn start(
             return Ok(weights);
         }
         let basis = package::draft(prepared, config, &weights, shapes)?;
-        let error = encoder_error(&basis, prepared, config, Judge::Network, &unseen, None)?;
+        let error = Trial::new(prepared, config, &basis)?.error(&unseen, None)?;
         if best.as_ref().is_none_or(|(least, _)| error < *least) {
             best = Some((error, weights));
         }
@@ -91,21 +84,25 @@ fn start_of_seed(
     mixes: &MixSettings,
     seed: u64,
 ) -> Result<StackWeights, LearnError> {
-    let samples = mixer(prepared, shapes, mixes, seed).mixes(START_MIXES, config.start.samples);
+    let samples = prepared
+        .mixer(shapes, mixes, seed)
+        .mixes(START_MIXES, config.start.samples);
+    let metric = prepared.metric();
+    let embedding = Embedding::new(&metric, prepared.position_weight);
     let input = StartInput {
-        topology: &prepared.topology,
-        rest: &prepared.rest,
+        embedding: &embedding,
         samples: &samples,
         claims: &prepared.claims,
         kept: &prepared.kept_rows,
         component_counts: &config.components,
         attention: config.fit.attention,
-        // What mixes move as one is not cut into pieces.
-        root_reach: config.start.root_reach.max(2.0 * mixes.reach as f32),
+        entry_budget: config.prune.entry_budget(prepared.rest.len()),
         rounds: config.start.rounds,
-        seed,
     };
-    let mut weights = closed_form_start(&input, &|v| prepared.distances(v));
+    let mut weights = closed_form_start(&input);
+    if config.fit.loss.unit_rows {
+        weights.normalize_rows();
+    }
     // The supports that the fit keeps are those of the package.
     package::draft(prepared, config, &weights, shapes)?.put_rows_into(&mut weights);
     Ok(weights)
@@ -122,26 +119,14 @@ pub(super) fn choose(
 ) -> Result<Plan, LearnError> {
     let mut best = Plan {
         mixes: config.mixes.clone(),
+        held_out_error: None,
         first_fit: None,
     };
     // A random start says nothing of the mixes.
     if held_out.is_empty() || config.mixes.per_step == 0 || config.start.kind == StartKind::Random {
         return Ok(best);
     }
-    let mut candidates: Vec<MixSettings> = config
-        .validation
-        .mix_candidates
-        .iter()
-        .map(|&(reach, regions_min, regions_max)| MixSettings {
-            reach,
-            regions_min,
-            regions_max,
-            ..config.mixes.clone()
-        })
-        .collect();
-    if candidates.is_empty() {
-        candidates.push(config.mixes.clone());
-    }
+    let candidates = candidates(config);
     reporter.stage("choosing how to mix", candidates.len() as u64);
     let mut least = f32::INFINITY;
     for (i, mixes) in candidates.into_iter().enumerate() {
@@ -149,7 +134,11 @@ pub(super) fn choose(
         let error = held_out.error(prepared, config, &weights)?;
         if error < least {
             least = error;
-            best = Plan { mixes, first_fit: None };
+            best = Plan {
+                mixes,
+                held_out_error: Some(error),
+                first_fit: None,
+            };
         }
         reporter.advance(i as u64 + 1, &format!("held-out E_rms {least:.2}"));
         if deadline.is_some_and(|deadline| Instant::now() > deadline) {
@@ -157,6 +146,45 @@ pub(super) fn choose(
         }
     }
     Ok(best)
+}
+
+/// What there is to choose from. Regions that the user asks for are not up for choice.
+fn candidates(config: &TrainConfig) -> Vec<MixSettings> {
+    let (own, standard) = (&config.mixes, MixSettings::default());
+    let regions = |mixes: &MixSettings| (mixes.reach, mixes.regions_min, mixes.regions_max);
+    if regions(own) != regions(&standard) || config.validation.mix_candidates.is_empty() {
+        return vec![own.clone()];
+    }
+    let candidates = config.validation.mix_candidates.iter();
+    candidates
+        .map(|&(reach, regions_min, regions_max)| MixSettings {
+            reach,
+            regions_min,
+            regions_max,
+            ..own.clone()
+        })
+        .collect()
+}
+
+/// The start from all shapes, where no step follows it.
+pub(super) fn start_alone(
+    prepared: &Prepared,
+    config: &TrainConfig,
+    plan: &Plan,
+    reporter: &dyn Reporter,
+) -> Result<FitOutcome, LearnError> {
+    let seeds = config.validation.start_seeds;
+    reporter.stage("starting", seeds as u64);
+    let all: Vec<usize> = (0..prepared.network.len()).collect();
+    Ok(FitOutcome {
+        weights: start(prepared, config, &all, &plan.mixes, seeds, reporter)?,
+        best_validation: plan.held_out_error,
+        best_step: 0,
+        steps_run: 0,
+        history: Vec::new(),
+        rollbacks: 0,
+        stop_reason: StopReason::Finished,
+    })
 }
 
 pub(super) fn run_fit(
@@ -183,27 +211,29 @@ pub(super) fn run_fit(
         reporter,
     )?;
     let mut batches: Box<dyn BatchSource> = if config.mixes.per_step > 0 {
-        let mixer = mixer(prepared, shapes, &plan.mixes, config.seed);
+        let mixer = prepared.mixer(shapes, &plan.mixes, config.seed);
         Box::new(MixBatches {
             mixer,
             per_step: config.mixes.per_step,
         })
     } else {
-        Box::new(ShapesSource::new(
-            Arc::clone(&prepared.network),
-            shapes.to_vec(),
-            config.seed,
-        ))
+        Box::new(shapes_source(prepared, config, shapes))
     };
     let distances = |v: usize| prepared.distances(v);
+    let vertex_weights = if config.fit.loss.weigh_by_area {
+        prepared.areas.clone()
+    } else {
+        vec![1.0; prepared.areas.len()]
+    };
     let input = FitInput {
         topology: &prepared.topology,
-        vertex_weights: &prepared.areas,
+        vertex_weights: &vertex_weights,
         position_modes: modes,
         kept_roots: prepared.kept_roots(),
         distances: &distances,
     };
     let settings = FitSettings {
+        steps: planned_steps(prepared, config, shapes),
         time_budget_s: bounds.budget.map(|budget| budget.as_secs_f64()),
         ..config.fit.clone()
     };
@@ -268,6 +298,22 @@ pub(super) fn run_fit(
         outcome.stop_reason = StopReason::Finished;
     }
     Ok(outcome)
+}
+
+/// The shapes themselves; with the reference, where nothing in the network gives it back for free.
+fn shapes_source(prepared: &Prepared, config: &TrainConfig, shapes: &[usize]) -> ShapesSource {
+    let with_reference = config.fit.activation == Activation::Plain;
+    ShapesSource::new(Arc::clone(&prepared.network), shapes, with_reference, config.seed)
+}
+
+/// Steps of the optimiser: those of the settings, or as many as their passes over the shapes take.
+pub(super) fn planned_steps(prepared: &Prepared, config: &TrainConfig, shapes: &[usize]) -> usize {
+    let steps = config.fit.steps;
+    if config.mixes.per_step > 0 {
+        steps
+    } else {
+        steps.saturating_mul(shapes_source(prepared, config, shapes).steps_of_a_pass())
+    }
 }
 
 /// Fresh mixes for every step.

@@ -18,6 +18,8 @@ pub(crate) const NORM_SOFTENING: f32 = 1e-6;
 pub struct LossSettings {
     /// λ1, in front of the three reconstruction terms.
     pub reconstruction_weight: f32,
+    /// Whether norms weigh vertices by their area, mean one, or all alike as the paper's do.
+    pub weigh_by_area: bool,
     /// Of the sum over blocks of `|x_b - y_b|²`, what each block sees less what it answers.
     pub block_weight: f32,
     /// Of `|e|²`, e = shapes less the sum of all blocks' answers.
@@ -43,6 +45,7 @@ impl LossSettings {
     pub fn paper() -> Self {
         Self {
             reconstruction_weight: 10.0,
+            weigh_by_area: false,
             block_weight: 1.0,
             total_weight: 0.0,
             position_weight: 0.0,
@@ -57,6 +60,7 @@ impl LossSettings {
     /// Rewards what is finally seen, the total and its effect on positions: weights that generalise from few shapes.
     pub fn local() -> Self {
         Self {
+            weigh_by_area: true,
             block_weight: 0.05,
             total_weight: 1.0,
             position_weight: 20.0,

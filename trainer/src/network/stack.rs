@@ -8,6 +8,7 @@ use burn::module::{Module, Param};
 use burn::tensor::{Device, IndexingUpdateOp, Int, Tensor, TensorData};
 use sinew_formats::package::FEATURE_COUNT;
 
+use super::activation::Activation;
 use super::attention::Attention;
 use super::device::model_device;
 use super::loss::{LossSettings, LossTerms, NORM_SOFTENING};
@@ -56,6 +57,7 @@ pub struct DifferentiableStack {
     device: Device,
     mean: TensorMean,
     attention: Attention,
+    activation: Activation,
     /// Shape: `[1, 1, V, 1]`.
     vertex_weights: Tensor<4>,
     /// Shape: `[V 9, I]`, absent without modes.
@@ -64,7 +66,13 @@ pub struct DifferentiableStack {
 
 impl DifferentiableStack {
     /// As [`super::kernel::Kernel::new`].
-    pub fn new(ring: &RingMean, vertex_weights: &[f32], modes: &[f32], attention: Attention) -> Self {
+    pub fn new(
+        ring: &RingMean,
+        vertex_weights: &[f32],
+        modes: &[f32],
+        attention: Attention,
+        activation: Activation,
+    ) -> Self {
         let device = model_device().autodiff();
         let vertex_count = ring.vertex_count();
         let len = vertex_count * FEATURE_COUNT;
@@ -72,6 +80,7 @@ impl DifferentiableStack {
         Self {
             mean: TensorMean::new(ring, &device),
             attention,
+            activation,
             vertex_weights: tensor(vertex_weights, [1, 1, vertex_count, 1], &device),
             modes: (mode_count > 0).then(|| tensor(modes, [mode_count, len], &device).transpose()),
             device,
@@ -94,7 +103,7 @@ impl DifferentiableStack {
         let mut block_error = zero(&self.device);
         let mut range = zero(&self.device);
         for level in &stack.levels {
-            let answer = level.forward(input.clone(), &self.mean);
+            let answer = level.forward(input.clone(), &self.mean, self.activation);
             let residual = input - answer.output.clone();
             block_error = block_error + self.squared_norm(residual.clone());
             error = error - answer.output.sum_dim(0);
@@ -264,13 +273,13 @@ impl Stack {
 
 impl Autoencoders {
     /// Input of shape `[B, N, V, 9]`.
-    fn forward(&self, input: Tensor<4>, mean: &TensorMean) -> Answer {
+    fn forward(&self, input: Tensor<4>, mean: &TensorMean, activation: Activation) -> Answer {
         let [block_count, shape_count, vertex_count, _] = input.dims();
         let components = self.components.val();
         let k_count = components.dims()[1];
         let len = vertex_count * FEATURE_COUNT;
         let rows = components.clone().reshape([block_count, k_count, len]);
-        let hidden = self.encoder.activate(self.encoder.convolve(input, mean));
+        let hidden = self.encoder.activate(self.encoder.convolve(input, mean), activation);
         let latents = hidden.reshape([block_count, shape_count, len]).matmul(rows.transpose());
         let hat = self
             .decoder
@@ -280,10 +289,10 @@ impl Autoencoders {
             .clone()
             .matmul(hat)
             .reshape([block_count, shape_count * vertex_count, FEATURE_COUNT]);
-        let output = self
-            .decoder
-            .activate(blend)
-            .reshape([block_count, shape_count, vertex_count, FEATURE_COUNT]);
+        let output =
+            self.decoder
+                .activate(blend, activation)
+                .reshape([block_count, shape_count, vertex_count, FEATURE_COUNT]);
         Answer { latents, output }
     }
 
@@ -319,10 +328,10 @@ impl GraphConvolutions {
         point + means.reshape(flat).matmul(self.neighbour.val().transpose())
     }
 
-    /// tanh, less the same at rest.
-    fn activate(&self, convolved: Tensor<3>) -> Tensor<3> {
+    /// tanh, less as much of the same at rest as the activation says.
+    fn activate(&self, convolved: Tensor<3>, activation: Activation) -> Tensor<3> {
         let bias = self.bias.val();
-        (convolved + bias.clone()).tanh() - bias.tanh()
+        (convolved + bias.clone()).tanh() - bias.tanh().mul_scalar(activation.rest_share())
     }
 }
 

@@ -174,6 +174,13 @@ pub fn zero_convolution() -> GraphConvRecord {
     }
 }
 
+/// A convolution that multiplies what it sees by `factor`, and looks at no neighbour.
+pub fn diagonal_convolution(factor: f32) -> GraphConvRecord {
+    let mut convolution = zero_convolution();
+    (0..FEATURE_COUNT).for_each(|c| convolution.point[c][c] = factor);
+    convolution
+}
+
 /// The convolution's numbers in order point, neighbour, bias.
 pub(crate) fn flatten_convolution(convolution: &GraphConvRecord) -> [f32; CONVOLUTION_LEN] {
     let mut flat = [0.0; CONVOLUTION_LEN];

@@ -12,7 +12,7 @@ use crc::{CRC_32_ISCSI, CRC_64_XZ, Crc};
 use thiserror::Error;
 
 use super::fit::{FitInput, FitSettings, FitState, HistoryPoint};
-use super::optimizer::{Moments, StepperState};
+use super::optimizer::{Adam, Moments};
 use crate::network::loss::LossTerms;
 use crate::network::weights::StackWeights;
 
@@ -78,13 +78,8 @@ pub(super) fn identity(input: &FitInput<'_>, settings: &FitSettings, start: &Sta
 }
 
 /// Replaces the checkpoint at `path`.
-pub(super) fn write(
-    path: &Path,
-    identity: u64,
-    state: &FitState,
-    moments: Option<&StepperState>,
-) -> Result<(), CheckpointError> {
-    let payload = encode(state, moments);
+pub(super) fn write(path: &Path, identity: u64, state: &FitState, optimizer: &Adam) -> Result<(), CheckpointError> {
+    let payload = encode(state, optimizer);
     let mut header = Vec::with_capacity(HEADER_BYTES);
     header.extend_from_slice(&MAGIC);
     header.extend_from_slice(&VERSION.to_le_bytes());
@@ -111,11 +106,7 @@ pub(super) fn write(
 }
 
 /// Reads the checkpoint at `path`, which must belong to the fit with this identity and start.
-pub(super) fn read(
-    path: &Path,
-    identity: u64,
-    start: &StackWeights,
-) -> Result<(FitState, Option<StepperState>), CheckpointError> {
+pub(super) fn read(path: &Path, identity: u64, start: &StackWeights) -> Result<(FitState, Adam), CheckpointError> {
     let damaged = |reason| CheckpointError::Damaged {
         path: path.to_path_buf(),
         reason,
@@ -148,15 +139,14 @@ pub(super) fn read(
     decode(payload, start).ok_or_else(|| damaged("its content is inconsistent"))
 }
 
-fn encode(state: &FitState, moments: Option<&StepperState>) -> Vec<u8> {
+fn encode(state: &FitState, optimizer: &Adam) -> Vec<u8> {
     let mut bytes = Vec::new();
-    let time = moments.map_or(0, |moments| moments.time);
     for count in [
         state.step,
         state.best_step,
         state.stale,
         state.rollbacks as usize,
-        time as usize,
+        optimizer.time as usize,
         state.history.len(),
     ] {
         bytes.extend_from_slice(&(count as u64).to_le_bytes());
@@ -187,16 +177,14 @@ fn encode(state: &FitState, moments: Option<&StepperState>) -> Vec<u8> {
         put(&mut bytes, &weights.flat_components());
         put(&mut bytes, &weights.flat_convolutions());
     }
-    if let Some(moments) = moments {
-        for part in [&moments.components, &moments.convolutions] {
-            put(&mut bytes, &part.first);
-            put(&mut bytes, &part.second);
-        }
+    for part in [&optimizer.components, &optimizer.convolutions] {
+        put(&mut bytes, &part.first);
+        put(&mut bytes, &part.second);
     }
     bytes
 }
 
-fn decode(payload: &[u8], start: &StackWeights) -> Option<(FitState, Option<StepperState>)> {
+fn decode(payload: &[u8], start: &StackWeights) -> Option<(FitState, Adam)> {
     let mut reader = Reader { rest: payload };
     let [step, best_step, stale, rollbacks, time, point_count] = [0; 6].map(|_| reader.count());
     let (step, best_step, stale, rollbacks) = (step?, best_step?, stale?, rollbacks?);
@@ -233,13 +221,13 @@ fn decode(payload: &[u8], start: &StackWeights) -> Option<(FitState, Option<Step
             second: reader.numbers(len)?,
         })
     };
-    let stepper = match time? {
-        0 => None,
-        time => Some(StepperState {
+    let optimizer = match time? {
+        0 => Adam::default(),
+        time => Adam {
             time: time as u64,
             components: moments(component_len)?,
             convolutions: moments(convolution_len)?,
-        }),
+        },
     };
     let rollbacks = u32::try_from(rollbacks).ok()?;
     let state = FitState {
@@ -254,7 +242,7 @@ fn decode(payload: &[u8], start: &StackWeights) -> Option<(FitState, Option<Step
         seconds,
         history,
     };
-    reader.rest.is_empty().then_some((state, stepper))
+    reader.rest.is_empty().then_some((state, optimizer))
 }
 
 fn put(bytes: &mut Vec<u8>, numbers: &[f32]) {

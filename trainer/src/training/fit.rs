@@ -8,12 +8,11 @@ use sinew_formats::package::FEATURE_COUNT;
 
 use super::checkpoint;
 use super::data::BatchSource;
-use super::optimizer::Stepper;
+use super::optimizer::Adam;
 use super::schedule::Stage;
 pub use super::terms::{
     Engine, FitInput, FitOutcome, FitProgress, FitSettings, Flow, HistoryPoint, StopReason, TrainingError,
 };
-use crate::network::attention::Attention;
 use crate::network::kernel::Kernel;
 use crate::network::loss::{LossSettings, LossTerms, SparsityRegions};
 use crate::network::ring::RingMean;
@@ -65,17 +64,11 @@ pub fn fit(
         Some(path) if path.exists() => Some(checkpoint::read(path, identity, &start)?),
         _ => None,
     };
-    let (state, stepper) = match resumed {
-        Some((state, moments)) => {
-            let stepper = Stepper::restore(moments, &state.weights);
-            (state, stepper)
-        }
-        None => (first_state(start, settings, validate), Stepper::new()),
-    };
+    let (state, optimizer) = resumed.unwrap_or_else(|| (first_state(start, settings, validate), Adam::default()));
     let supports = settings.keep_supports.then_some(supports);
     let first_step = state.step;
     let mut run = Run {
-        network: Network::new(settings.engine, settings.attention, input),
+        network: Network::new(settings, input),
         regions: SparsityRegions::new(input.distances),
         supports,
         kept,
@@ -84,7 +77,7 @@ pub fn fit(
             .rate
             .unwrap_or(RATE_TIMES_ROOT_V / (input.topology.vertex_count as f32).sqrt()),
         state,
-        stepper,
+        optimizer,
         gradient: None,
         checkpoint: checkpoints.map(|path| (path.to_path_buf(), identity)),
         begun: Instant::now(),
@@ -207,13 +200,20 @@ enum Network {
 }
 
 impl Network {
-    fn new(engine: Engine, attention: Attention, input: &FitInput<'_>) -> Self {
+    fn new(settings: &FitSettings, input: &FitInput<'_>) -> Self {
+        let (attention, activation) = (settings.attention, settings.activation);
         let ring = RingMean::new(input.topology);
         let (vertex_weights, modes) = (input.vertex_weights, input.position_modes);
-        match engine {
-            Engine::Kernel => Self::Kernel(Box::new(Kernel::new(ring, vertex_weights, modes, attention))),
+        match settings.engine {
+            Engine::Kernel => Self::Kernel(Box::new(Kernel::new(
+                ring,
+                vertex_weights,
+                modes,
+                attention,
+                activation,
+            ))),
             Engine::Tensors => {
-                let model = DifferentiableStack::new(&ring, vertex_weights, modes, attention);
+                let model = DifferentiableStack::new(&ring, vertex_weights, modes, attention, activation);
                 Self::Tensors(Box::new(model))
             }
         }
@@ -249,7 +249,7 @@ struct Run<'a> {
     settings: &'a FitSettings,
     rate: f32,
     state: FitState,
-    stepper: Stepper,
+    optimizer: Adam,
     /// Of the last step, if that trained all levels: its memory serves the next.
     gradient: Option<StackWeights>,
     checkpoint: Option<(PathBuf, u64)>,
@@ -319,7 +319,7 @@ impl Run<'_> {
             .schedule
             .stage(step, step_count, self.state.weights.levels.len());
         if step == stage.steps.start && step > 0 {
-            self.stepper = Stepper::new();
+            self.optimizer = Adam::default();
             self.state.stale = 0;
         }
         stage
@@ -358,7 +358,7 @@ impl Run<'_> {
         if sound {
             let component_rate = rate * f64::from(settings.component_rate_factor);
             let convolution_rate = rate * f64::from(settings.convolution_rate_factor);
-            self.stepper
+            self.optimizer
                 .step(&mut state.weights, &gradient, component_rate, convolution_rate);
             if let Some(supports) = &self.supports {
                 clear_outside(&mut state.weights, supports);
@@ -382,7 +382,7 @@ impl Run<'_> {
             }
             state.rate_scale *= 0.5;
             state.weights.clone_from(&state.best);
-            self.stepper = Stepper::new();
+            self.optimizer = Adam::default();
         }
         Ok(loss)
     }
@@ -408,7 +408,7 @@ impl Run<'_> {
 
     fn save(&self) -> Result<(), TrainingError> {
         if let Some((path, identity)) = &self.checkpoint {
-            checkpoint::write(path, *identity, &self.state, self.stepper.state().as_ref())?;
+            checkpoint::write(path, *identity, &self.state, &self.optimizer)?;
         }
         Ok(())
     }

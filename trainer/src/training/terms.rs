@@ -8,6 +8,7 @@ use thiserror::Error;
 use super::checkpoint::CheckpointError;
 use super::schedule::Schedule;
 use crate::mesh::topology::Topology;
+use crate::network::activation::Activation;
 use crate::network::attention::Attention;
 use crate::network::loss::{LossSettings, LossTerms};
 use crate::network::weights::StackWeights;
@@ -27,7 +28,8 @@ pub enum Engine {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FitSettings {
-    /// Steps of the optimiser; the rate's decay is planned over them.
+    /// Steps of the optimiser; 0 leaves the start as it is. The rate's decay is planned over them. Where a training job learns from the shapes themselves
+    /// and not from mixes, passes over all of them: each as many steps as batches hold the shapes.
     pub steps: usize,
     /// Learning rate at the first step; by the number of vertices (1.2e-2 / √V) where absent.
     pub rate: Option<f32>,
@@ -57,6 +59,8 @@ pub struct FitSettings {
     pub schedule: Schedule,
     /// How residuals are shared out among the blocks below.
     pub attention: Attention,
+    /// What follows a convolution.
+    pub activation: Activation,
     /// What to minimise.
     pub loss: LossSettings,
 }
@@ -64,7 +68,7 @@ pub struct FitSettings {
 impl Default for FitSettings {
     fn default() -> Self {
         Self {
-            steps: 300,
+            steps: 0,
             rate: None,
             component_rate_factor: 1.0,
             convolution_rate_factor: 0.3,
@@ -78,6 +82,7 @@ impl Default for FitSettings {
             engine: Engine::Kernel,
             schedule: Schedule::Joint,
             attention: Attention::Components,
+            activation: Activation::FromRest,
             loss: LossSettings::local(),
         }
     }

@@ -30,6 +30,7 @@ fn strip() -> Topology {
         faces: Vec::new(),
         ring_offsets,
         ring,
+        piece_of: Vec::new(),
         bridges: Vec::new(),
         findings: TopologyFindings::default(),
     }

@@ -9,7 +9,7 @@ use core::f64::consts::{PI, TAU};
 use nalgebra::Rotation3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use sinew_formats::interchange::MeshSequence;
+use sinew_interchange::MeshSequence;
 use std::collections::BTreeMap;
 
 /// Height of the bar and width of its square section, in metres.

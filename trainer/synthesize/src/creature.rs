@@ -4,7 +4,7 @@ use super::gait::Gait;
 use super::polygonize::polygonize;
 use super::skeleton::{bones, field, skin, weights};
 use super::{FRAME_SECONDS, Settings, Subject, SynthesizeError, V3, sequence};
-use sinew_formats::interchange::MeshSequence;
+use sinew_interchange::MeshSequence;
 
 /// Synthesizes a creature that walks on the spot on y = 0 and looks along +z; shape 0 stands still. Closed and in one piece.
 ///

@@ -11,7 +11,7 @@ use super::{FRAME_SECONDS, Settings, Subject, SynthesizeError, V3, sequence};
 use core::f64::consts::TAU;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use sinew_formats::interchange::MeshSequence;
+use sinew_interchange::MeshSequence;
 
 /// Length away from the pole and height, in metres.
 const LENGTH: f64 = 1.5;

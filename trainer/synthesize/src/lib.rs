@@ -17,7 +17,7 @@ pub use flag::flag;
 
 use core::ops::RangeInclusive;
 use nalgebra::Vector3;
-use sinew_formats::interchange::MeshSequence;
+use sinew_interchange::MeshSequence;
 
 type V3 = Vector3<f64>;
 
@@ -162,7 +162,7 @@ fn sequence(subject: Subject, faces: Vec<[u32; 3]>, shapes: &[Vec<V3>]) -> MeshS
             .map(|shape| shape.iter().map(|p| [p.x as f32, p.y as f32, p.z as f32]).collect())
             .collect(),
         shape_names: (0..shapes.len()).map(|m| format!("{}[{m}]", subject.name())).collect(),
-        render: None,
+        ..MeshSequence::default()
     }
 }
 

@@ -78,10 +78,10 @@ fn counts_and_numbers_are_sound() {
             core::array::from_fn(|c| sequence.shapes[0].iter().map(|p| p[c]).fold(start, pick))
         };
         let diagonal = distance(corner(f32::max, f32::MIN), corner(f32::min, f32::MAX));
-        for (m, pair) in sequence.shapes.windows(2).enumerate() {
-            let moved = pair[0]
+        for (m, (shape, next)) in sequence.shapes.iter().zip(sequence.shapes.iter().skip(1)).enumerate() {
+            let moved = shape
                 .iter()
-                .zip(&pair[1])
+                .zip(next)
                 .map(|(a, b)| distance(*a, *b))
                 .fold(0.0, f64::max);
             // A hundredth of a millimetre a frame is standing still.
@@ -203,13 +203,12 @@ fn bar_twists_past_half_a_turn_and_bends() {
     };
     let (a, b) = (corner(1.0), corner(-1.0));
     let (mut angle, mut widest, mut lean) = (0.0f64, 0.0f64, 0.0f64);
-    let heading =
-        |shape: &Vec<[f32; 3]>| f64::from(shape[a][2] - shape[b][2]).atan2(f64::from(shape[a][0] - shape[b][0]));
-    for pair in bar.shapes.windows(2) {
-        let step = heading(&pair[1]) - heading(&pair[0]);
+    let heading = |shape: &[[f32; 3]]| f64::from(shape[a][2] - shape[b][2]).atan2(f64::from(shape[a][0] - shape[b][0]));
+    for (shape, next) in bar.shapes.iter().zip(bar.shapes.iter().skip(1)) {
+        let step = heading(next) - heading(shape);
         angle += step.sin().atan2(step.cos());
         widest = widest.max(angle.abs());
-        lean = lean.max(f64::from(pair[1][a][0].hypot(pair[1][a][2])));
+        lean = lean.max(f64::from(next[a][0].hypot(next[a][2])));
     }
     assert!(
         widest > core::f64::consts::PI,
@@ -240,7 +239,7 @@ fn no_gait_cycle_repeats() {
     })
     .unwrap();
     for (m, shape) in creature.shapes.iter().enumerate() {
-        for (n, earlier) in creature.shapes[..m].iter().enumerate() {
+        for (n, earlier) in creature.shapes.iter().take(m).enumerate() {
             let apart = shape
                 .iter()
                 .zip(earlier)

@@ -1,24 +1,22 @@
-//! Rules of the baked payload: what the frame path relies on without looking. Both tiers obey the same rules, and their
-//! errors bear the same names.
+//! Rules of the baked payload: what the frame path relies on without looking. The patches of
+//! both tiers obey the same rules, and their errors bear the same names.
 
 use super::{
     super::{
-        BakedView, FAN_VERTICES, FastView, GROUP_NODES, OpenError, SKIN_WEIGHT_SUM, TILE_ENTRIES, TILE_SIDE, TierView,
-        limits, render,
+        BakedView, FAN_VERTICES, GROUP_NODES, IndexSlice, OpenError, PatchesView, QUAD, SolveView, TILE_ENTRIES, limits,
     },
-    BlockLinks, ascending_below, below, control, count, faces, finite_halves, names, offsets, positions, positive,
-    same_count, tree, within,
+    BlockLinks, after, ascending_below, below, bones, control, count, indices, names, offsets, positions, positive,
+    prior, same_count, surface, tree, value_scales, within,
 };
 
 /// Proves every promise that [`super::super::BakedBasis`] makes.
 pub(in super::super) fn check(view: &BakedView<'_>) -> Result<(), OpenError> {
-    let vertex_count = positions(view.exact().rest_positions(), 3)?;
-    faces(view.faces().len(), view.faces().iter().copied(), vertex_count)?;
-    permutation(
-        ["lane_from_vertex", "vertex_from_lane"],
-        [view.lane_from_vertex(), view.vertex_from_lane()],
-        vertex_count,
-    )?;
+    let vertex_count = positions(view.rest_positions(), 3)?;
+    let component_count = view.component_count();
+    permutation("slot_from_vertex", view.slot_from_vertex(), vertex_count)?;
+    inverse(view, vertex_count)?;
+    surface(&view.surface(), vertex_count)?;
+    render_order(view.surface().render_points)?;
     fans(view, vertex_count)?;
     positive("rotation_scale", 0, view.rotation_scale(), limits::FEATURE_SCALE)?;
     positive("stretch_scale", 0, view.stretch_scale(), limits::FEATURE_SCALE)?;
@@ -31,10 +29,8 @@ pub(in super::super) fn check(view: &BakedView<'_>) -> Result<(), OpenError> {
             component_count: block.component_count,
         }
     };
-    tree(view.block_count(), links, view.component_count(), |k| {
-        view.component(k).block
-    })?;
-    names(view.component_count(), |k| view.component(k).name)?;
+    tree(view.block_count(), links, component_count, |k| view.component(k).block)?;
+    names(component_count, |k| view.component(k).name)?;
     for (b, block) in view.blocks().enumerate() {
         for value in block.bias {
             within("blocks.bias", b, value, -limits::NETWORK_VALUE, limits::NETWORK_VALUE)?;
@@ -42,104 +38,79 @@ pub(in super::super) fn check(view: &BakedView<'_>) -> Result<(), OpenError> {
     }
     for (k, component) in view.components().enumerate() {
         control(k, component.minimum, component.maximum)?;
-        positive("components.value_scale", k, component.value_scale, limits::VALUE_SCALE)?;
+        value_scales(k, component.value_scales)?;
     }
-    tier(view, &view.exact(), 0.0)?;
-    if let Some(fast) = view.fast() {
-        fast_tier(view, &fast, vertex_count)?;
+    if view.exact().is_none() && view.bones().is_none() {
+        return Err(OpenError::NoTier);
     }
-    render::check(
-        &view.render_mesh(),
-        view.faces().len(),
-        view.faces().iter().copied(),
-        vertex_count,
-    )
+    if let Some(exact) = view.exact() {
+        patches(view, &exact.patches, vertex_count)?;
+        solve(&exact.solve, vertex_count)?;
+    }
+    if let Some(bones) = view.bones() {
+        bones::check(view, &bones)?;
+    }
+    after(&view.after(), component_count, vertex_count)?;
+    prior(&view.prior(), component_count)
 }
 
-fn fast_tier(view: &BakedView<'_>, fast: &FastView<'_>, vertex_count: usize) -> Result<(), OpenError> {
-    let nodes = fast.nodes();
-    let node_count = positions(nodes.rest_positions(), 1)?;
-    count("rest_positions", node_count, 1, vertex_count.min(limits::FAST_NODES))?;
-    // A weight between two nodes is what is left of the mesh's, and may have either sign.
-    tier(view, &nodes, -limits::EDGE_WEIGHT)?;
-    for coordinate in fast.centre() {
-        within("fast.centre", 0, coordinate, -limits::POSITION, limits::POSITION)?;
-    }
-    skin(fast, vertex_count, node_count)?;
-    let error = fast.error();
-    let figures = [
-        ("fast.error.mixed_rms", error.mixed_rms),
-        ("fast.error.mixed_p99", error.mixed_p99),
-        ("fast.error.mixed_max", error.mixed_max),
-        ("fast.error.single_rms", error.single_rms),
-        ("fast.error.single_max", error.single_max),
-        ("fast.error.normal_rms", error.normal_rms),
-    ];
-    for (field, figure) in figures {
-        within(field, 0, figure, 0.0, limits::QUALITY)?;
-    }
-    Ok(())
+/// `count` indices below `count`. That no two are the same shows from an inverse, or from [`distinct`].
+fn permutation(field: &'static str, list: IndexSlice<'_>, count: usize) -> Result<(), OpenError> {
+    same_count(field, list.len(), count)?;
+    indices(field, list, 1, count)
 }
 
-fn skin(fast: &FastView<'_>, vertex_count: usize, node_count: usize) -> Result<(), OpenError> {
-    let (nodes, weights) = (fast.skin_nodes(), fast.skin_weights());
-    same_count("skin_nodes", nodes.len(), vertex_count)?;
-    same_count("skin_weights", weights.len(), vertex_count)?;
-    for (lane, (row, weights)) in nodes.iter().zip(weights).enumerate() {
-        for &node in row {
-            below("skin_nodes", lane, u32::from(node), node_count)?;
-        }
-        let sum = weights.iter().map(|&weight| u32::from(weight)).sum();
-        if sum != SKIN_WEIGHT_SUM {
-            return Err(OpenError::SkinWeightSum { lane, sum });
-        }
+/// The second order undoes the first, so both are permutations.
+fn inverse(view: &BakedView<'_>, vertex_count: usize) -> Result<(), OpenError> {
+    let (slots, vertices) = (view.slot_from_vertex(), view.vertex_from_slot());
+    permutation("vertex_from_slot", vertices, vertex_count)?;
+    match slots
+        .iter()
+        .enumerate()
+        .find(|&(v, slot)| vertices.at(slot as usize) as usize != v)
+    {
+        Some((index, _)) => Err(OpenError::NotAPermutation {
+            field: "slot_from_vertex",
+            index,
+        }),
+        None => Ok(()),
     }
-    Ok(())
 }
 
-/// Both lists have `count` indices < `count` and the second undoes the first, so both are permutations.
-fn permutation(fields: [&'static str; 2], lists: [&[u32]; 2], count: usize) -> Result<(), OpenError> {
-    same_count(fields[0], lists[0].len(), count)?;
-    same_count(fields[1], lists[1].len(), count)?;
-    for (index, &image) in lists[0].iter().enumerate() {
-        below(fields[0], index, image, count)?;
-        if lists[1][image as usize] as usize != index {
-            return Err(OpenError::NotAPermutation {
-                field: fields[0],
-                index,
-            });
-        }
+/// Render vertices stand in the order of their slots, so that writing them walks through memory.
+fn render_order(render_points: IndexSlice<'_>) -> Result<(), OpenError> {
+    let pairs = render_points.iter().zip(render_points.iter().skip(1));
+    match pairs.enumerate().find(|(_, (slot, next))| next < slot) {
+        Some((r, _)) => Err(OpenError::NotAscending {
+            field: "render_points",
+            index: r + 1,
+        }),
+        None => Ok(()),
     }
-    Ok(())
 }
 
-/// A tier whose positions are proved.
-fn tier(view: &BakedView<'_>, tier: &TierView<'_>, least_weight: f32) -> Result<(), OpenError> {
-    rings(tier, least_weight)?;
-    factor(tier)?;
-    lanes(tier)?;
-    patches(view, tier)
+fn solve(solve: &SolveView<'_>, node_count: usize) -> Result<(), OpenError> {
+    rings(solve, node_count)?;
+    factor(solve, node_count)?;
+    distinct(solve, node_count)
 }
 
-fn rings(tier: &TierView<'_>, least_weight: f32) -> Result<(), OpenError> {
-    let node_count = tier.node_count();
-    let (ring, weights) = (tier.ring(), tier.ring_weights());
+fn rings(solve: &SolveView<'_>, node_count: usize) -> Result<(), OpenError> {
+    let (ring, weights) = (solve.ring, solve.ring_weights);
     count("ring", ring.len(), 0, limits::RING_ENTRIES)?;
     same_count("ring_weights", weights.len(), ring.len())?;
-    offsets("ring_offsets", tier.ring_offsets(), node_count, ring.len())?;
-    let row = |v: usize| tier.ring_offsets()[v] as usize..tier.ring_offsets()[v + 1] as usize;
+    offsets("ring_offsets", solve.ring_offsets, node_count, ring.len())?;
+    let row = |v: usize| solve.ring_offsets[v] as usize..solve.ring_offsets[v + 1] as usize;
     for v in 0..node_count {
-        ascending_below("ring", row(v).start, &ring[row(v)], node_count)?;
+        ascending_below("ring", row(v).start, row(v).map(|entry| ring.at(entry)), node_count)?;
     }
+    indices("ring", ring, 1, node_count)?;
     for v in 0..node_count {
         for entry in row(v) {
-            within("ring_weights", entry, weights[entry], least_weight, limits::EDGE_WEIGHT)?;
-            let other = row(ring[entry] as usize);
-            let back = ring[other.clone()]
-                .binary_search(&(v as u32))
-                .map(|place| other.start + place);
+            within("ring_weights", entry, weights[entry], 0.0, limits::EDGE_WEIGHT)?;
+            let back = search(ring, row(ring.at(entry) as usize), v as u32);
             // An edge to itself would be its own way back.
-            let symmetric = back.is_ok_and(|back| back != entry && weights[back] == weights[entry]);
+            let symmetric = back.is_some_and(|back| back != entry && weights[back] == weights[entry]);
             if !symmetric {
                 return Err(OpenError::NotSymmetric {
                     field: "ring",
@@ -151,29 +122,38 @@ fn rings(tier: &TierView<'_>, least_weight: f32) -> Result<(), OpenError> {
     Ok(())
 }
 
-fn factor(tier: &TierView<'_>) -> Result<(), OpenError> {
-    let column_count = tier.tile_column_count();
-    let (rows, tiles, inverse_diagonals) = (tier.tile_rows(), tier.tiles(), tier.inverse_diagonals());
+/// Where `value` stands in an ascending row.
+fn search(slice: IndexSlice<'_>, row: core::ops::Range<usize>, value: u32) -> Option<usize> {
+    let place = match slice {
+        IndexSlice::Short(values) => values[row.clone()].binary_search(&u16::try_from(value).ok()?),
+        IndexSlice::Wide(values) => values[row.clone()].binary_search(&value),
+    };
+    place.ok().map(|place| row.start + place)
+}
+
+fn factor(solve: &SolveView<'_>, node_count: usize) -> Result<(), OpenError> {
+    let column_count = node_count.div_ceil(QUAD);
+    let (rows, tiles, inverse_diagonals) = (solve.tile_rows, solve.tiles, solve.inverse_diagonals);
     count("tile_rows", rows.len(), 0, limits::TILES)?;
     same_count("tiles", tiles.len(), rows.len())?;
-    offsets("tile_offsets", tier.tile_offsets(), column_count, rows.len())?;
-    for (column, range) in tier.tile_offsets().windows(2).enumerate() {
-        let start = range[0] as usize;
-        let entries = &rows[start..range[1] as usize];
-        ascending_below("tile_rows", start, entries, column_count)?;
-        if entries.first().is_some_and(|&row| row as usize <= column) {
+    offsets("tile_offsets", solve.tile_offsets, column_count, rows.len())?;
+    for (column, range) in solve.tile_offsets.windows(2).enumerate() {
+        let (start, end) = (range[0] as usize, range[1] as usize);
+        ascending_below("tile_rows", start, (start..end).map(|t| rows.at(t)), column_count)?;
+        if start < end && rows.at(start) as usize <= column {
             return Err(OpenError::NotAscending {
                 field: "tile_rows",
                 index: start,
             });
         }
     }
+    // As wide as the nodes' own indices: one width for the whole tier.
+    indices("tile_rows", rows, 1, node_count)?;
     matrices("tiles", tiles, limits::FACTOR_VALUE)?;
     same_count("inverse_diagonals", inverse_diagonals.len(), column_count)?;
     matrices("inverse_diagonals", inverse_diagonals, limits::INVERSE_PIVOT)?;
-    for node in 0..tier.node_count() {
-        let (column, side) = (node / TILE_SIDE, node % TILE_SIDE);
-        if inverse_diagonals[column][(TILE_SIDE + 1) * side] <= 0.0 {
+    for node in 0..node_count {
+        if inverse_diagonals[node / QUAD][(QUAD + 1) * (node % QUAD)] <= 0.0 {
             return Err(OpenError::PivotNotPositive { index: node });
         }
     }
@@ -193,21 +173,37 @@ fn matrices(field: &'static str, values: &[[f32; TILE_ENTRIES]], greatest: f32) 
     Ok(())
 }
 
-fn lanes(tier: &TierView<'_>) -> Result<(), OpenError> {
-    permutation(
-        ["solver_from_lane", "lane_from_solver"],
-        [tier.solver_from_lane(), tier.lane_from_solver()],
-        tier.node_count(),
-    )
+/// Places whose marks fit on the stack at a time.
+const MARKED: usize = 16 * 1024;
+
+/// Every slot has a solver place of its own. Without an inverse to ask and without a heap the places are marked, some
+/// thousand at a time: one pass for a character, 256 for the largest mesh that the format holds.
+fn distinct(solve: &SolveView<'_>, node_count: usize) -> Result<(), OpenError> {
+    let field = "solver_from_slot";
+    permutation(field, solve.solver_from_slot, node_count)?;
+    for first in (0..node_count).step_by(MARKED) {
+        let mut marks = [0_u32; MARKED / 32];
+        for (index, place) in solve.solver_from_slot.iter().enumerate() {
+            let place = (place as usize).wrapping_sub(first);
+            if place < MARKED {
+                let (word, bit) = (&mut marks[place / 32], 1 << (place % 32));
+                if *word & bit != 0 {
+                    return Err(OpenError::NotAPermutation { field, index });
+                }
+                *word |= bit;
+            }
+        }
+    }
+    Ok(())
 }
 
-fn patches(view: &BakedView<'_>, tier: &TierView<'_>) -> Result<(), OpenError> {
-    let (owners, values) = (tier.patch_owners(), tier.patch_values());
+pub(super) fn patches(view: &BakedView<'_>, patches: &PatchesView<'_>, node_count: usize) -> Result<(), OpenError> {
+    let owners = patches.owners;
     count("patch_owners", owners.len(), 0, limits::PATCHES)?;
-    same_count("patch_values", values.len(), owners.len())?;
-    let group_count = tier.node_count().div_ceil(GROUP_NODES);
-    offsets("patch_offsets", tier.patch_offsets(), group_count, owners.len())?;
-    for row in tier.patch_offsets().windows(2) {
+    same_count("patch_values", patches.values.len(), owners.len())?;
+    let group_count = node_count.div_ceil(GROUP_NODES);
+    offsets("patch_offsets", patches.offsets, group_count, owners.len())?;
+    for row in patches.offsets.windows(2) {
         let mut previous = None;
         for index in row[0] as usize..row[1] as usize {
             let [component, block] = owners[index];
@@ -228,28 +224,18 @@ fn patches(view: &BakedView<'_>, tier: &TierView<'_>) -> Result<(), OpenError> {
             previous = Some(component);
         }
     }
-    for (patch, rows) in values.iter().enumerate() {
-        finite_halves("patch_values", rows).map_err(|_| OpenError::NotFinite {
-            field: "patch_values",
-            index: patch,
-        })?;
-    }
     Ok(())
 }
 
 fn fans(view: &BakedView<'_>, vertex_count: usize) -> Result<(), OpenError> {
-    let fans = view.fans();
-    count("fans", fans.len(), 0, limits::FANS)?;
+    let (fans, step_count) = (view.fans(), view.fans().len() / FAN_VERTICES);
+    count("fans", step_count, 0, limits::FANS)?;
+    same_count("fans", fans.len(), FAN_VERTICES * step_count)?;
     offsets(
         "fan_offsets",
         view.fan_offsets(),
         vertex_count.div_ceil(FAN_VERTICES),
-        fans.len(),
+        step_count,
     )?;
-    for (index, lanes) in fans.iter().enumerate() {
-        for &lane in lanes {
-            below("fans", index, lane, vertex_count)?;
-        }
-    }
-    Ok(())
+    indices("fans", fans, FAN_VERTICES, vertex_count)
 }

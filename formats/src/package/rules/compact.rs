@@ -1,16 +1,15 @@
 //! Rules of the compact payload.
 
 use super::{
-    super::{CompactView, GraphConvRecord, OpenError, limits, render},
-    BlockLinks, below, control, count, faces, finite_halves, names, positions, positive, same_count, title, tree,
-    within,
+    super::{CompactView, GraphConvRecord, OpenError, limits},
+    BlockLinks, after, below, control, count, names, positions, positive, prior, same_count, surface, title, tree,
+    value_scales, within,
 };
 
 /// Proves every promise that [`super::super::CompactBasis`] makes.
 pub(in super::super) fn check(view: &CompactView<'_>) -> Result<(), OpenError> {
-    let triangles = view.faces();
     let vertex_count = positions(view.rest_positions(), 3)?;
-    faces(triangles.len(), triangles.iter(), vertex_count)?;
+    surface(&view.surface(), vertex_count)?;
     bridges(view.bridges(), vertex_count)?;
     below("anchor_vertex", 0, view.anchor_vertex(), vertex_count)?;
     positive("rotation_scale", 0, view.rotation_scale(), limits::FEATURE_SCALE)?;
@@ -38,12 +37,14 @@ pub(in super::super) fn check(view: &CompactView<'_>) -> Result<(), OpenError> {
         within("components.strength", k, component.strength, 0.0, limits::QUALITY)?;
         within("components.locality", k, component.locality, 0.0, 1.0)?;
         control(k, component.minimum, component.maximum)?;
-        positive("components.value_scale", k, component.value_scale, limits::VALUE_SCALE)?;
+        value_scales(k, component.value_scales)?;
     }
     supports(view, vertex_count)?;
     provenance(view)?;
     quality(view)?;
-    render::check(&view.render_mesh(), triangles.len(), triangles.iter(), vertex_count)
+    after(&view.after(), view.component_count(), vertex_count)?;
+    prior(&view.prior(), view.component_count())?;
+    count("encoder", view.encoder().len(), 0, limits::ENCODER_BYTES)
 }
 
 fn bridges(bridges: &[[u32; 2]], vertex_count: usize) -> Result<(), OpenError> {
@@ -88,7 +89,7 @@ fn supports(view: &CompactView<'_>, vertex_count: usize) -> Result<(), OpenError
             actual: values.len() as u64,
         });
     }
-    finite_halves("values", values)
+    Ok(())
 }
 
 fn provenance(view: &CompactView<'_>) -> Result<(), OpenError> {
@@ -98,7 +99,8 @@ fn provenance(view: &CompactView<'_>) -> Result<(), OpenError> {
     count("provenance.config", provenance.config.len(), 0, limits::CONFIG_BYTES)?;
     let shape_count = provenance.shape_count as usize;
     count("provenance.shape_count", shape_count, 1, limits::SHAPES)?;
-    super::ascending_below("provenance.train_shapes", 0, provenance.train_shapes, shape_count)
+    let shapes = provenance.train_shapes.iter().copied();
+    super::ascending_below("provenance.train_shapes", 0, shapes, shape_count)
 }
 
 fn quality(view: &CompactView<'_>) -> Result<(), OpenError> {

@@ -3,11 +3,12 @@
 //! unique names (K squared short comparisons) and the symmetric rings (a search a ring entry).
 
 pub(super) mod baked;
+mod bones;
 pub(super) mod compact;
 #[cfg(all(test, feature = "alloc"))]
 mod tests;
 
-use super::{NONE, OpenError, limits};
+use super::{After, IndexSlice, NO_PIECE, NONE, OpenError, Prior, SHORT_COUNT, SurfaceView, limits};
 
 /// At least `least` and at most `limit` elements.
 pub(super) fn count(field: &'static str, actual: usize, least: usize, limit: usize) -> Result<(), OpenError> {
@@ -66,18 +67,6 @@ fn positive(field: &'static str, index: usize, value: f32, greatest: f32) -> Res
     }
 }
 
-/// Every half is finite: its exponent is not all ones.
-fn finite_halves<const N: usize>(field: &'static str, values: &[[u16; N]]) -> Result<(), OpenError> {
-    const EXPONENT: u16 = 0x7c00;
-    match values
-        .iter()
-        .position(|halves| halves.iter().any(|half| half & EXPONENT == EXPONENT))
-    {
-        Some(index) => Err(OpenError::NotFinite { field, index }),
-        None => Ok(()),
-    }
-}
-
 /// `value < limit`.
 pub(super) fn below(field: &'static str, index: usize, value: u32, limit: usize) -> Result<(), OpenError> {
     if (value as usize) < limit {
@@ -92,10 +81,15 @@ pub(super) fn below(field: &'static str, index: usize, value: u32, limit: usize)
     }
 }
 
-/// Each value is < `limit` and greater than the one before; `start` is where `values` lies in the field.
-fn ascending_below(field: &'static str, start: usize, values: &[u32], limit: usize) -> Result<(), OpenError> {
+/// Each value is < `limit` and greater than the one before; `start` is where `values` begin in the field.
+fn ascending_below(
+    field: &'static str,
+    start: usize,
+    values: impl Iterator<Item = u32>,
+    limit: usize,
+) -> Result<(), OpenError> {
     let mut previous = None;
-    for (i, &value) in values.iter().enumerate() {
+    for (i, value) in values.enumerate() {
         if previous.is_some_and(|previous| value <= previous) {
             return Err(OpenError::NotAscending {
                 field,
@@ -132,15 +126,106 @@ fn positions(rest_positions: &[[f32; 3]], least: usize) -> Result<usize, OpenErr
     Ok(rest_positions.len())
 }
 
-/// At least one triangle, and corners that are vertices.
-fn faces(face_count: usize, triangles: impl Iterator<Item = [u32; 3]>, vertex_count: usize) -> Result<(), OpenError> {
-    count("faces", face_count, 1, limits::FACES)?;
-    for (f, corners) in triangles.enumerate() {
-        for vertex in corners {
-            below("faces", f, vertex, vertex_count)?;
+/// Indices of `limit` things, `stride` of them an element of the field, as wide as their count asks for.
+fn indices(field: &'static str, slice: IndexSlice<'_>, stride: usize, limit: usize) -> Result<(), OpenError> {
+    let greatest = match slice {
+        IndexSlice::Short(values) => values.iter().max().map(|&value| u32::from(value)),
+        IndexSlice::Wide(values) => values.iter().max().copied(),
+    };
+    let Some(greatest) = greatest else {
+        return Ok(());
+    };
+    if greatest as usize >= limit {
+        // The slow way only says which it was.
+        for (i, value) in slice.iter().enumerate() {
+            below(field, i / stride, value, limit)?;
         }
     }
+    if (limit <= SHORT_COUNT) != matches!(slice, IndexSlice::Short(_)) {
+        return Err(OpenError::IndexWidth { field });
+    }
     Ok(())
+}
+
+/// At least one triangle, corners that are render vertices where there are any, and render vertices that are points.
+fn surface(surface: &SurfaceView<'_>, point_count: usize) -> Result<(), OpenError> {
+    let render_count = surface.render_points.len();
+    count("render_points", render_count, 0, limits::RENDER_VERTICES)?;
+    same_count("uvs", surface.uvs.len(), render_count)?;
+    indices("render_points", surface.render_points, 1, point_count)?;
+    for (r, uv) in surface.uvs.iter().enumerate() {
+        for &coordinate in uv {
+            within("uvs", r, coordinate, -limits::TEXTURE, limits::TEXTURE)?;
+        }
+    }
+    count("corners", surface.face_count(), 1, limits::FACES)?;
+    same_count("corners", surface.corners.len(), 3 * surface.face_count())?;
+    let named = if surface.has_texture() {
+        render_count
+    } else {
+        point_count
+    };
+    indices("corners", surface.corners, 3, named)
+}
+
+/// What is added after the solve: pieces and modes whose counts agree, and numbers that are finite.
+fn after(after: &After<'_>, component_count: usize, point_count: usize) -> Result<(), OpenError> {
+    let pieces = after.piece_count(component_count);
+    count("after.piece_offsets", pieces, 0, limits::PIECES)?;
+    same_count(
+        "after.piece_offsets",
+        after.piece_offsets.len(),
+        pieces * component_count,
+    )?;
+    let points = if pieces == 0 { 0 } else { point_count };
+    same_count("after.piece_of", after.piece_of.len(), points)?;
+    for (point, &piece) in after.piece_of.iter().enumerate() {
+        if piece != NO_PIECE {
+            below("after.piece_of", point, u32::from(piece), pieces)?;
+        }
+    }
+    for (index, offset) in after.piece_offsets.iter().enumerate() {
+        for &x in offset {
+            within("after.piece_offsets", index, x, -limits::POSITION, limits::POSITION)?;
+        }
+    }
+    let modes = after.mode_count();
+    count("after.mode_scales", modes, 0, limits::MODES)?;
+    for (m, &scale) in after.mode_scales.iter().enumerate() {
+        positive("after.mode_scales", m, scale, limits::POSITION)?;
+    }
+    same_count("after.mix", after.mix.len(), modes * component_count)?;
+    for (index, &share) in after.mix.iter().enumerate() {
+        within("after.mix", index, share, -limits::NETWORK_VALUE, limits::NETWORK_VALUE)?;
+    }
+    same_count("after.modes", after.modes.len(), modes * point_count)
+}
+
+/// Nothing is known, or a mean and a positive variance of every weight, and factors of all.
+fn prior(prior: &Prior<'_>, component_count: usize) -> Result<(), OpenError> {
+    let known = if prior.mean.is_empty() { 0 } else { component_count };
+    same_count("prior.mean", prior.mean.len(), known)?;
+    same_count("prior.variances", prior.variances.len(), known)?;
+    let factors = prior.factors.len() / component_count;
+    count(
+        "prior.factors",
+        factors,
+        0,
+        if known == 0 { 0 } else { limits::PRIOR_FACTORS },
+    )?;
+    same_count("prior.factors", prior.factors.len(), factors * component_count)?;
+    let greatest = limits::CONTROL;
+    for (k, &mean) in prior.mean.iter().enumerate() {
+        within("prior.mean", k, mean, -greatest, greatest)?;
+    }
+    for (index, &factor) in prior.factors.iter().enumerate() {
+        within("prior.factors", index, factor, -greatest, greatest)?;
+    }
+    for (k, &variance) in prior.variances.iter().enumerate() {
+        positive("prior.variances", k, variance, greatest * greatest)?;
+    }
+    let strongest = if known == 0 { 0.0 } else { limits::QUALITY };
+    within("prior.strength", 0, prior.strength, 0.0, strongest)
 }
 
 /// What the tree needs to know of a block.
@@ -230,6 +315,14 @@ fn names<'a>(component_count: usize, name: impl Fn(usize) -> &'a str) -> Result<
         if let Some(first) = (0..second).find(|&first| name(first) == name(second)) {
             return Err(OpenError::NameDuplicate { first, second });
         }
+    }
+    Ok(())
+}
+
+/// Both scales of a component are positive.
+fn value_scales(component: usize, scales: super::ValueScales) -> Result<(), OpenError> {
+    for scale in [scales.rotation, scales.stretch] {
+        positive("components.value_scales", component, scale, limits::VALUE_SCALE)?;
     }
     Ok(())
 }

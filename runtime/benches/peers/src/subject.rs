@@ -2,14 +2,13 @@
 //! creature, and any mesh at hand, all with a made-up network of 10 coarse and 50 fine components on geodesic-like patches,
 //! as sparse as trained ones (7 entries a vertex in all).
 
-use half::f16;
 use sinew_formats::package::{
-    AlignedBytes, BlockRecord, CompactBasis, CompactView, ComponentRecord, FEATURE_COUNT, GraphConvRecord, NONE,
-    Provenance, Quality, RenderMesh, write_compact,
+    After, AlignedBytes, BlockRecord, CompactBasis, CompactView, ComponentRecord, FEATURE_COUNT, GraphConvRecord, NONE,
+    Prior, Provenance, Quality, Surface, ValueScales, write_compact,
 };
 
 use sinew_bake::mesh::{cotangent::EdgeWeights, topology::Topology, widened};
-use sinew_bake::{BakeOptions, Surface, bake, bake_with};
+use sinew_bake::{BakeOptions, Surface as BakedSurface, bake, bake_with};
 use sinew_synthesize::{Settings, Subject as Sequence};
 
 /// Coarse components.
@@ -18,8 +17,8 @@ const COARSE: usize = 10;
 const FINE: usize = 5;
 /// All components.
 pub const COMPONENTS: usize = COARSE + COARSE * FINE;
-/// Larger meshes are baked without a fast tier.
-const FAST_VERTICES_MAX: usize = 13_000;
+/// Larger meshes are baked without bones.
+const BONES_VERTICES_MAX: usize = 13_000;
 /// Share of the vertices that a coarse component moves, and a fine one: 10 * 0.25 + 50 * 0.09 = 7 entries a vertex.
 const SHARES: [f64; 2] = [0.25, 0.09];
 /// Range of the biases.
@@ -54,8 +53,8 @@ impl Subject {
             frames: 2,
             ..Sequence::Creature.default_settings()
         };
-        let mut sequence = Sequence::Creature.synthesize(&settings).expect("settings in range");
-        let rest = sequence.shapes.swap_remove(0);
+        let sequence = Sequence::Creature.synthesize(&settings).expect("settings in range");
+        let rest = sequence.shapes[0].to_vec();
         Self::of_mesh(format!("creature {}", rest.len()), rest, sequence.faces)
     }
 
@@ -68,8 +67,8 @@ impl Subject {
     /// A compact package, for instance a trained one.
     pub fn of_package(name: String, compact: AlignedBytes) -> Self {
         let view = CompactView::open(&compact).expect("a sound package");
-        // The fast tier is fitted to hundreds of poses, which takes too long on the largest.
-        let baked = if view.vertex_count() <= FAST_VERTICES_MAX {
+        // Bones are fitted to a thousand poses, which takes too long on the largest.
+        let baked = if view.vertex_count() <= BONES_VERTICES_MAX {
             bake_with(&view, &BakeOptions::default())
         } else {
             bake(&view)
@@ -84,7 +83,7 @@ impl Subject {
         }
     }
 
-    /// A baked package of the mesh whose made-up network has no biases; without a fast tier.
+    /// A baked package of the mesh whose made-up network has no biases; without bones.
     pub fn without_bias(&self) -> AlignedBytes {
         let compact = compact(&self.rest, &self.faces, 0.0);
         let view = CompactView::open(&compact).expect("a sound package");
@@ -92,8 +91,8 @@ impl Subject {
     }
 
     /// The surface that the baker sees.
-    pub fn surface(&self) -> Surface {
-        Surface::of_package(&CompactView::open(&self.compact).expect("a sound package"))
+    pub fn surface(&self) -> BakedSurface {
+        BakedSurface::of_package(&CompactView::open(&self.compact).expect("a sound package"))
     }
 
     /// Vertex whose displacement is held.
@@ -205,14 +204,17 @@ fn compact(rest: &[[f32; 3]], faces: &[[u32; 3]], bias: f32) -> AlignedBytes {
         };
         let patch = nearest(&topology, centre, (SHARES[level] * vertex_count as f64) as usize);
         let amplitude: [f64; FEATURE_COUNT] = core::array::from_fn(|_| 2.0 * noise.next() - 1.0);
+        let mut own = Vec::new();
         let mut window = vec![0.0; vertex_count];
         for (n, &v) in patch.iter().enumerate() {
             window[v] = 1.0 - n as f64 / patch.len() as f64;
         }
         for v in (0..vertex_count).filter(|&v| window[v] > 0.0) {
             support_bits[k * words + v / 32] |= 1 << (v % 32);
-            values.push(amplitude.map(|a| f16::from_f64(0.5 * a * window[v]).to_bits()));
+            own.push(amplitude.map(|a| (0.5 * a * window[v]) as f32));
         }
+        let value_scales = ValueScales::for_values(&own);
+        values.extend(own.iter().map(|value| value_scales.round(value)));
         components.push(ComponentRecord {
             name,
             block: if level == 0 {
@@ -226,12 +228,12 @@ fn compact(rest: &[[f32; 3]], faces: &[[u32; 3]], bias: f32) -> AlignedBytes {
             locality: 1.0,
             minimum: -1.0,
             maximum: 1.0,
-            value_scale: 1.0,
+            value_scales,
         });
     }
     write_compact(&CompactBasis {
         rest_positions: rest,
-        faces,
+        surface: Surface::plain(vertex_count, faces),
         bridges: &topology.bridges,
         anchor_vertex: anchor(&topology, &wide) as u32,
         rotation_scale: 0.8,
@@ -240,6 +242,9 @@ fn compact(rest: &[[f32; 3]], faces: &[[u32; 3]], bias: f32) -> AlignedBytes {
         components: &components,
         support_bits: &support_bits,
         values: &values,
+        after: After::NONE,
+        prior: Prior::NONE,
+        encoder: &[],
         provenance: Provenance {
             tool: "benchmark",
             sequence: "made up",
@@ -253,7 +258,6 @@ fn compact(rest: &[[f32; 3]], faces: &[[u32; 3]], bias: f32) -> AlignedBytes {
             steps: 0,
             steps_run: 0,
         },
-        render: RenderMesh::NONE,
     })
     .expect("the made-up package keeps the rules")
 }

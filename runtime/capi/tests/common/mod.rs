@@ -10,17 +10,17 @@ use std::process::Command;
 use std::sync::OnceLock;
 
 use sinew_formats::package::{
-    AlignedBytes, fixture::TinyRender, fixture::tiny_baked, fixture::tiny_compact, limits, write_baked, write_compact,
+    AlignedBytes, fixture::TinySurface, fixture::tiny_baked, fixture::tiny_compact, limits, write_baked, write_compact,
 };
 
 pub fn crate_folder() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The hand-made package, with a fast tier.
+/// The hand-made package, with bones.
 pub fn package() -> AlignedBytes {
     let mut baked = tiny_baked();
-    baked.fast = Some(baked.own_nodes());
+    baked.bones = Some(baked.three_bones());
     write_baked(&baked.basis()).expect("the fixture is valid")
 }
 
@@ -29,12 +29,14 @@ pub fn compact_package() -> AlignedBytes {
     write_compact(&tiny_compact().basis()).expect("the fixture is valid")
 }
 
-/// One of the same shape with another rest mesh, and a solver so stiff that large weights overflow; without fast tier and
+/// One of the same shape with another rest mesh, and a solver so stiff that large weights overflow; without bones and
 /// texture coordinates.
 pub fn other_package() -> AlignedBytes {
     let mut baked = tiny_baked();
-    baked.exact.rest_positions[0][2] += 0.25;
-    baked.render = TinyRender::default();
+    baked.rest_positions[0][2] += 0.25;
+    let corners = baked.surface.corners.iter();
+    let slots = corners.map(|corners| corners.map(|r| baked.surface.render_points[r as usize]));
+    baked.surface = TinySurface::plain(&slots.collect::<Vec<_>>());
     baked.exact.ring_weights.fill(limits::EDGE_WEIGHT);
     baked.exact.tiles.as_flattened_mut().fill(limits::FACTOR_VALUE);
     for block in &mut baked.exact.inverse_diagonals {
@@ -42,6 +44,18 @@ pub fn other_package() -> AlignedBytes {
             .iter_mut()
             .filter(|x| **x > 0.0)
             .for_each(|x| *x = limits::INVERSE_PIVOT);
+    }
+    write_baked(&baked.basis()).expect("the fixture is valid")
+}
+
+/// The first package with the names of its controls turned round, and one that no other package has.
+pub fn renamed_package() -> AlignedBytes {
+    let mut baked = tiny_baked();
+    let mut names: Vec<&'static str> = baked.components.iter().map(|component| component.name).collect();
+    names.rotate_left(1);
+    *names.last_mut().expect("some") = "a new one";
+    for (component, name) in baked.components.iter_mut().zip(names) {
+        component.name = name;
     }
     write_baked(&baked.basis()).expect("the fixture is valid")
 }
@@ -85,15 +99,34 @@ pub fn libraries() -> &'static Libraries {
     })
 }
 
-/// Names of the functions that the header declares.
+/// The headers, that of the frame first.
+pub const HEADERS: [&str; 5] = [
+    "sinew.h",
+    "sinew_pins.h",
+    "sinew_batch.h",
+    "sinew_bones.h",
+    "sinew_knobs.h",
+];
+
+/// Their lines.
+pub fn headers() -> String {
+    let read = |name| fs::read_to_string(crate_folder().join("include").join(name)).expect("the header is there");
+    HEADERS.map(read).concat()
+}
+
+/// Names of the functions that the headers declare.
 pub fn header_functions() -> BTreeSet<String> {
-    let header = fs::read_to_string(crate_folder().join("include/sinew.h")).expect("the header is there");
+    let headers = headers();
+    let (_, mut declared) = headers.split_once("extern \"C\"").expect("functions");
     let mut code = String::new();
-    for part in header.split("*/") {
-        code += part.split("/*").next().expect("a first part");
+    while let Some((before, after)) = declared.split_once("/*") {
+        code += before;
+        declared = after.split_once("*/").expect("comments end").1;
     }
-    code.split(|c: char| !(c.is_alphanumeric() || c == '_'))
-        .filter(|word| word.starts_with("sinew_"))
+    code += declared;
+    let code = code.lines().map(|line| line.split("//").next().expect("a first part"));
+    code.flat_map(|line| line.split(|c: char| !(c.is_alphanumeric() || c == '_')))
+        .filter(|word| word.starts_with("sinew_") && !HEADERS.contains(&format!("{word}.h").as_str()))
         .map(str::to_owned)
         .collect()
 }

@@ -1,5 +1,6 @@
 //! A host in few lines: what a C program does, from Rust, through the exported functions alone.
 
+use core::ffi::c_void;
 use core::mem::MaybeUninit;
 use core::ptr::null_mut;
 
@@ -29,7 +30,7 @@ impl Memory {
         }
     }
 
-    pub fn pointer(&mut self) -> *mut u8 {
+    pub fn pointer(&mut self) -> *mut c_void {
         self.lines.as_mut_ptr().cast()
     }
 
@@ -69,7 +70,7 @@ impl Player {
 
     /// The same for a tier that the package has.
     pub fn of_tier(package: &[u8], tier: SinewTier) -> Result<Self, SinewStatus> {
-        let options = SinewWorkspaceOptions {
+        let mut options = SinewWorkspaceOptions {
             struct_bytes: size_of::<SinewWorkspaceOptions>(),
             tier: tier as i32,
             kernels: SinewKernels::Widest as i32,
@@ -80,7 +81,7 @@ impl Player {
             let (mut basis, mut workspace, mut controls) = (null_mut(), null_mut(), null_mut());
             let status = sinew_basis_open(
                 SINEW_ABI_VERSION,
-                package.as_ptr(),
+                package.as_ptr().cast(),
                 package.len(),
                 basis_memory.pointer(),
                 basis_memory.bytes(),
@@ -93,10 +94,14 @@ impl Player {
             let mut info = sized::<SinewBasisInfo>();
             assert_eq!(sinew_basis_info(basis, info.as_mut_ptr()), SinewStatus::Ok);
             let info = info.assume_init();
-            let bytes = layout_bytes(|layout| sinew_workspace_layout_for(basis, &options, layout));
+            if info.has_exact_tier == 0 {
+                // All that a mutant may have left.
+                options.tier = SinewTier::Bones as i32;
+            }
+            let bytes = layout_bytes(|layout| sinew_workspace_layout(basis, &options, layout));
             let mut workspace_memory = Memory::new(bytes);
             let (memory, bytes) = (workspace_memory.pointer(), workspace_memory.bytes());
-            let status = sinew_workspace_create_for(basis, &options, memory, bytes, &mut workspace, null_mut());
+            let status = sinew_workspace_create(basis, &options, memory, bytes, &mut workspace, null_mut());
             assert_eq!(status, SinewStatus::Ok);
             let mut controls_memory = Memory::new(layout_bytes(|layout| sinew_controls_layout(basis, layout)));
             let (memory, bytes) = (controls_memory.pointer(), controls_memory.bytes());
@@ -165,52 +170,89 @@ impl Player {
     }
 }
 
-/// Handles of a player's basis.
-pub struct Held {
-    _memory: Memory,
-    pub handles: *mut SinewHandles,
+/// A player in one block, with bytes behind it that are nobody's.
+pub struct Block {
+    memory: Memory,
+    tail_bytes: usize,
+    pub player: SinewPlayer,
 }
 
-impl Held {
+impl Block {
+    pub fn new(package: &[u8], tier: SinewTier, tail_bytes: usize) -> Result<Self, SinewStatus> {
+        let options = SinewWorkspaceOptions {
+            struct_bytes: size_of::<SinewWorkspaceOptions>(),
+            tier: tier as i32,
+            kernels: SinewKernels::Widest as i32,
+        };
+        let (bytes, length) = (package.as_ptr().cast(), package.len());
+        let mut layout = SinewLayout {
+            size_bytes: 0,
+            alignment: 64,
+        };
+        let mut player = sized::<SinewPlayer>();
+        // SAFETY: every pointer is to memory that lives as long as the block, of the lengths that the layout says; the player
+        // is whole once it is open.
+        unsafe {
+            match sinew_player_layout(bytes, length, &options, &mut layout, null_mut()) {
+                SinewStatus::Ok => {}
+                refused => return Err(refused),
+            }
+            let mut memory = Memory::new(layout.size_bytes + tail_bytes);
+            let (at, room, out) = (memory.pointer(), memory.bytes(), player.as_mut_ptr());
+            let status = sinew_player_open(SINEW_ABI_VERSION, bytes, length, &options, at, room, out, null_mut());
+            assert_eq!(status, SinewStatus::Ok);
+            Ok(Self {
+                memory,
+                tail_bytes,
+                player: player.assume_init(),
+            })
+        }
+    }
+
+    /// The bytes behind it, as they were.
+    pub fn tail(&self) -> &[u8] {
+        let bytes = self.memory.lines.as_ptr().cast::<u8>();
+        // SAFETY: the memory is that long.
+        unsafe { core::slice::from_raw_parts(bytes.add(self.memory.bytes() - self.tail_bytes), self.tail_bytes) }
+    }
+}
+
+/// Pins of a player's basis.
+pub struct Pins {
+    _memory: Memory,
+    pub pins: *mut SinewPins,
+}
+
+impl Pins {
     pub fn new(player: &Player, capacity: u32) -> Self {
-        let mut handles = null_mut();
+        let mut pins = null_mut();
         // SAFETY: the memory is as long as the layout says and lives as long as this.
         unsafe {
-            let bytes = layout_bytes(|layout| sinew_handles_layout(player.basis, capacity, layout));
+            let bytes = layout_bytes(|layout| sinew_pins_layout(player.basis, capacity, layout));
             let mut memory = Memory::new(bytes);
             let (at, room) = (memory.pointer(), memory.bytes());
-            let status = sinew_handles_create(player.basis, capacity, at, room, &mut handles, null_mut());
+            let status = sinew_pins_create(player.basis, capacity, at, room, &mut pins, null_mut());
             assert_eq!(status, SinewStatus::Ok);
-            Self {
-                _memory: memory,
-                handles,
-            }
+            Self { _memory: memory, pins }
         }
     }
 
     pub fn add(&self, player: &Player, vertex: u32) -> SinewStatus {
         // SAFETY: the player's memory stands.
-        unsafe { sinew_handles_add(player.basis, self.handles, player.workspace, vertex, null_mut()) }
+        unsafe { sinew_pins_add(player.basis, self.pins, player.workspace, vertex, null_mut()) }
     }
 
     pub fn aim(&self, vertex: u32, target: [f32; 3]) -> SinewStatus {
         // SAFETY: this memory stands.
-        unsafe { sinew_handles_target(self.handles, vertex, target.as_ptr()) }
+        unsafe { sinew_pins_move(self.pins, vertex, target.as_ptr()) }
     }
 
     pub fn drag(&self, player: &Player) -> Result<SinewDragReport, SinewStatus> {
         let mut report = sized::<SinewDragReport>();
         // SAFETY: the player's memory stands; the report is whole after a drag.
         unsafe {
-            let (handles, out) = (self.handles, report.as_mut_ptr());
-            match sinew_drag(
-                player.basis,
-                handles,
-                player.workspace,
-                player.controls,
-                out,
-                null_mut(),
-            ) {
+            let (pins, out) = (self.pins, report.as_mut_ptr());
+            match sinew_pins_drag(player.basis, pins, player.workspace, player.controls, out, null_mut()) {
                 SinewStatus::Ok => Ok(report.assume_init()),
                 refused => Err(refused),
             }
@@ -244,7 +286,7 @@ impl Vertices {
             position_floats: player.positions.len(),
             normals: player.normals.as_ptr(),
             normal_floats: player.normals.len(),
-            bytes: self.bytes.as_mut_ptr(),
+            bytes: self.bytes.as_mut_ptr().cast(),
             byte_count: self.bytes.len(),
             scratch: self.scratch.as_mut_ptr(),
             scratch_floats: self.scratch.len(),

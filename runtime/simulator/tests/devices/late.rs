@@ -1,6 +1,6 @@
 //! Frames that come late, floods, and the life of the thread.
 
-use sinew_runtime::input::{Link, QUEUE_EVENTS, SerialError};
+use sinew_knobs::device::{Link, QUEUE_EVENTS, SerialError};
 
 use super::*;
 
@@ -23,7 +23,7 @@ fn steps_are_all_there_however_late_the_frame() {
     let status = bench.source.device_status();
     assert!(status.merged > 100, "{status:#?}");
     assert_eq!(
-        (status.counts.dropped, status.counters.dropped),
+        (status.replaced, status.counters.dropped),
         (0, 0),
         "nothing of them is lost: {status:#?}"
     );
@@ -43,7 +43,7 @@ fn the_newest_position_of_each_knob_wins() {
     });
     bench.settle();
     let status = bench.source.device_status();
-    assert!(status.counts.dropped > 10, "{status:#?}");
+    assert!(status.replaced > 10, "{status:#?}");
 }
 
 /// Half a second at what a line of 1 Mbaud carries, on frames of 16 ms and one stall.
@@ -60,8 +60,8 @@ fn a_flood_stays_within_its_bounds_and_in_order() {
     bench.settle();
     assert!(most_waiting <= QUEUE_EVENTS as u64 + 8, "{most_waiting}");
     let status = bench.source.device_status();
-    assert_eq!((status.counts.bad, status.counters.dropped), (0, 0), "{status:#?}");
-    assert!(status.counts.events > 5_000, "{status:#?}");
+    assert_eq!((status.counters.bad, status.counters.dropped), (0, 0), "{status:#?}");
+    assert!(status.counters.events > 5_000, "{status:#?}");
 }
 
 #[test]
@@ -111,5 +111,5 @@ fn a_missing_port_is_an_error_or_is_waited_for() {
         heard.len() >= 2 && heard.iter().all(|event| matches!(event, SourceEvent::Knob(_))),
         "{heard:?}"
     );
-    assert_eq!((source.status().unplugs, source.status().replugs), (0, 0));
+    assert_eq!((source.device_status().unplugs, source.device_status().replugs), (0, 0));
 }

@@ -13,9 +13,8 @@ use std::path::Path;
 use std::thread;
 use std::time::Instant;
 
-use sinew_runtime::input::{
-    Clock, ControlSource, KnobEvent, Protocol, Reading, SerialSelector, SerialSettings, SerialSource, SourceEvent,
-};
+use sinew_knobs::device::{Clock, SerialSelector, SerialSettings, SerialSource};
+use sinew_knobs::{ControlSource, KnobEvent, Protocol, Reading, SourceEvent};
 use sinew_simulator::{BoxSettings, Dialect, KnobBox, Port, Running, Script, Simulator};
 use tempfile::TempDir;
 
@@ -84,7 +83,10 @@ impl Bench {
         let heard = &mut self.heard;
         self.source.poll(now_us, &mut |at_us, event| {
             assert!(at_us <= now_us);
-            heard.push(event);
+            // A label goes before its knob; who reads it is of no concern here.
+            if !matches!(event, SourceEvent::Named { .. }) {
+                heard.push(event);
+            }
         });
         thread::sleep(length);
     }
@@ -137,8 +139,8 @@ impl Bench {
         let mut before = None;
         self.until("rest", |bench| {
             let status = bench.source.device_status();
-            let rests = status.waiting == 0 && before == Some(status.counts.bytes);
-            before = Some(status.counts.bytes);
+            let rests = status.waiting == 0 && before == Some(status.counters.bytes);
+            before = Some(status.counters.bytes);
             thread::sleep(Duration::from_millis(30));
             rests
         });
@@ -147,14 +149,9 @@ impl Bench {
         let status = self.source.device_status();
         let knobs = self.heard.len() - self.links().len();
         assert_eq!(
-            status.counts.events,
-            knobs as u64 + status.counts.dropped + status.merged,
+            status.counters.events,
+            knobs as u64 + status.replaced + status.merged,
             "{status:#?}"
-        );
-        let counters = status.counters;
-        assert_eq!(
-            (counters.bytes, counters.events),
-            (status.counts.bytes, status.counts.events)
         );
     }
 }

@@ -2,9 +2,8 @@
 //! further than its knob did, nor faster than its limit.
 
 use sinew_bake::{bake_bytes, fixture};
-use sinew_runtime::input::{
-    Binding, Centre, ControlMap, ControlSurface, Knob, KnobState, Response, SlotState, SurfaceLayout, SurfaceSettings,
-    TakeoverState,
+use sinew_knobs::{
+    Binding, Centre, ControlMap, ControlSurface, Knob, Response, SurfaceBuffers, SurfaceSettings, TakeoverState,
 };
 use sinew_runtime::{Basis, Controls};
 
@@ -41,11 +40,9 @@ fn turn_and_pull(seed: u64, pull_ms: u32) {
         ..Binding::default()
     }];
     let map = ControlMap::new(basis, &knobs, &bindings, &[], None).unwrap();
-    let layout = SurfaceLayout::for_map(&map);
-    let mut states = vec![KnobState::default(); layout.knob_count];
-    let mut slots = vec![SlotState::default(); layout.slot_count];
+    let mut buffers = SurfaceBuffers::for_map(&map);
     let mut weights = vec![0.0; basis.component_count()];
-    let mut surface = ControlSurface::new(map, SurfaceSettings::default(), &mut states, &mut slots).unwrap();
+    let mut surface = ControlSurface::new(map, SurfaceSettings::default(), buffers.memory()).unwrap();
     let mut controls = Controls::new(&basis, &mut weights).unwrap();
     let component = basis.component(0);
     let span = component.maximum - component.minimum;
@@ -100,12 +97,12 @@ fn turn_and_pull(seed: u64, pull_ms: u32) {
             "the weight went {weight_way} and the knob let it go {most}"
         );
         let state = surface.takeover(0);
-        let gone = bench.source.status().unplugs > 0;
+        let gone = bench.source.device_status().unplugs > 0;
         if !matches!(state, TakeoverState::Engaged) && gone {
             assert_eq!(moved, 0.0, "{state:?}");
         }
         was_engaged |= state == TakeoverState::Engaged && !gone;
-        engaged_again |= state == TakeoverState::Engaged && bench.source.status().replugs > 0;
+        engaged_again |= state == TakeoverState::Engaged && bench.source.device_status().replugs > 0;
     }
     assert!(was_engaged);
     assert_eq!(bench.links(), [SourceEvent::Unplugged, SourceEvent::Replugged]);

@@ -1,7 +1,7 @@
 //! Every protocol through a terminal, named and sniffed.
 
-use sinew_runtime::input::Link;
-use sinew_runtime::input::protocol::Recognition;
+use sinew_knobs::device::Link;
+use sinew_knobs::protocol::Recognition;
 
 use super::*;
 
@@ -26,11 +26,11 @@ fn check(dialect: Dialect, settings: SerialSettings) -> Bench {
     bench.settle();
     let status = bench.source.device_status();
     assert_eq!(
-        (status.counts.bad, status.counts.unplugs, status.counts.dropped),
+        (status.counters.bad, status.unplugs, status.replaced),
         (0, 0, 0),
         "{dialect}: {status:#?}"
     );
-    assert_eq!(status.counts.bytes, bench.running.status().sent_bytes, "{dialect}");
+    assert_eq!(status.counters.bytes, bench.running.status().sent_bytes, "{dialect}");
     bench
 }
 

@@ -9,18 +9,22 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 
 use clap::Args;
-use crossbeam::channel::{Sender, unbounded};
+use crossbeam::channel::{Sender, bounded};
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
+use sinew_formats::package::AlignedBytes;
+use sinew_knobs::SurfaceLayout;
+use sinew_knobs::device::Clock;
 use sinew_runtime::Basis;
-use sinew_runtime::input::{Clock, SurfaceLayout};
 
 use super::{Failure, catch_interrupts, interrupted, parse_duration, read_choice};
 use crate::calibration::{Calibrations, default_path};
 use crate::count::count;
+use crate::demo;
 use crate::device::{Device, DeviceArguments, identity, listen, open};
 use crate::model;
+use crate::page::{PageAddress, Served, Server};
 use crate::play::{Live, LiveOutcome, Scene, SceneMemory, start_typed_lines};
-use crate::snapshot::{Board, Labels, Request};
+use crate::snapshot::{Board, Labels, REQUESTS_MAX, Request};
 use crate::stream::{Stream, StreamSpec};
 use crate::view;
 use crate::wiring::{HeardKnob, Router, resolve};
@@ -35,6 +39,9 @@ use crate::wiring::{HeardKnob, Router, resolve};
 Without a device, or beside one, --typed takes lines such as `c0 0.5`, `rest`, `stop`, `release`, `next`, `previous`, `into`, \
         `out`, `next-fine`, `focus c0`, `page 2`, `record` and `quit` on standard input.
 
+With --page the mesh is seen, and its components are moved, in a browser; a telephone is a remote control, and \
+        `?view=mesh&background=transparent` behind the page's address is a browser source for OBS. As many pages as you like.
+
 Streams: obj:FILE replaces one OBJ file at every frame, obj:FOLDER/ numbers them; raw and raw:FILE write floats; udp:PORT \
         and udp-weights:PORT send datagrams to this machine. docs/streams.md has the layouts.
 
@@ -42,7 +49,8 @@ A take holds what the knobs said, not what the mesh did: --replay plays it to th
         by the names of its components on another. With --fps, a replay has frames of its own, for keys at 24 a second.
 
 Examples:
-  sinew-stage play walk.sinew                                  plug a box in and turn
+  sinew-stage play --demo --page                               nothing at hand: a built-in worm, in a browser
+  sinew-stage play walk.sinew --page                           plug a box in, turn, and look at http://127.0.0.1:8080
   sinew-stage play walk.sinew --knobs show.toml --record show.take
   sinew-stage play walk.sinew --replay show.take --export weights.csv --fps 24
   sinew-stage play walk.sinew --osc 9000 --stream udp:9001
@@ -50,7 +58,11 @@ Examples:
 )]
 pub struct PlayArguments {
     /// Compact or baked package
-    package: PathBuf,
+    #[arg(required_unless_present = "demo")]
+    package: Option<PathBuf>,
+    /// Play a built-in sea worm instead of a package
+    #[arg(long, conflicts_with = "package")]
+    demo: bool,
     #[command(flatten)]
     device: DeviceArguments,
     /// Which knob moves what, and how: see docs/knobs.toml
@@ -71,6 +83,10 @@ pub struct PlayArguments {
     /// Where the moving mesh goes; may be repeated
     #[arg(long = "stream", value_name = "KIND[:TARGET]")]
     streams: Vec<StreamSpec>,
+    /// Serve a page that shows the mesh and moves it by mouse and touch, to any browser; without ADDRESS:PORT to this machine
+    /// alone, at 127.0.0.1:8080. At another address the page's URL holds a token, and only who has it may come
+    #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1, default_missing_value = "8080")]
+    page: Option<PageAddress>,
     /// Status lines on standard error instead of the view; so it is, too, where standard output is no terminal
     #[arg(long)]
     headless: bool,
@@ -100,11 +116,12 @@ fn parse_fps(text: &str) -> Result<f64, String> {
 /// What was refused, or that Ctrl-C ended it.
 pub fn run(arguments: &PlayArguments, quiet: bool) -> Result<(), Failure> {
     catch_interrupts();
-    let bytes = model::load(&arguments.package)?;
-    let basis = model::open(&bytes, &arguments.package)?;
+    let path = arguments.package.as_deref();
+    let bytes = Arc::new(path.map_or_else(demo::package, model::load)?);
+    let basis = model::open(&bytes, path.unwrap_or(Path::new(demo::NAME)))?;
     match &arguments.replay {
-        Some(take) => again::run(arguments, &basis, take, quiet),
-        None => live(arguments, &basis, quiet),
+        Some(take) => again::run(arguments, &bytes, &basis, take, quiet),
+        None => live(arguments, &bytes, &basis, quiet),
     }
 }
 
@@ -125,26 +142,40 @@ fn start_streams(arguments: &PlayArguments, basis: &Basis<'_>) -> Result<Vec<Str
             "standard output takes one raw stream: give the others a file, raw:FILE"
         ));
     }
-    let start = |spec: &StreamSpec| {
-        Stream::start(
-            spec.clone(),
-            basis.vertex_count(),
-            basis.component_count(),
-            basis.faces(),
-        )
-    };
+    let faces = basis.faces().to_vec();
+    let start = |spec: &StreamSpec| Stream::start(spec.clone(), basis.vertex_count(), basis.component_count(), &faces);
     arguments.streams.iter().map(start).collect()
 }
 
-fn title(path: &Path, basis: &Basis<'_>) -> String {
-    let name = path
-        .file_name()
-        .map_or(String::new(), |name| name.to_string_lossy().into_owned());
+fn title(path: Option<&Path>, basis: &Basis<'_>) -> String {
+    let file = path.and_then(Path::file_name);
+    let name = file.map_or(demo::NAME.to_owned(), |name| name.to_string_lossy().into_owned());
     format!(
         "{name}: {} vertices, {} components",
         basis.vertex_count(),
         basis.component_count()
     )
+}
+
+/// The page, if one was asked for; where it is is said even to who wants quiet: nobody could open it otherwise.
+fn start_page(
+    arguments: &PlayArguments,
+    package: &Arc<AlignedBytes>,
+    board: &Arc<Board>,
+    labels: &Labels,
+    requests: &Sender<Request>,
+) -> Result<Option<Server>, Report> {
+    let Some(address) = arguments.page else { return Ok(None) };
+    let served = Served {
+        package: Arc::clone(package),
+        labels: labels.clone(),
+        board: Arc::clone(board),
+        requests: requests.clone(),
+        is_replay: arguments.replay.is_some(),
+    };
+    let server = Server::start(address, served)?;
+    eprintln!("page: {}", server.url());
+    Ok(Some(server))
 }
 
 /// The view or the status lines, until the board is closed.
@@ -203,7 +234,7 @@ struct Heard {
     identity: Option<String>,
 }
 
-fn live(arguments: &PlayArguments, basis: &Basis<'_>, quiet: bool) -> Result<(), Failure> {
+fn live(arguments: &PlayArguments, bytes: &Arc<AlignedBytes>, basis: &Basis<'_>, quiet: bool) -> Result<(), Failure> {
     let clock = Clock::start();
     let (file, choice) = read_choice(arguments.knobs.as_deref(), &arguments.device)?;
     // Names and ranges are checked before anything is opened: a mistake in a file costs no three seconds.
@@ -219,7 +250,7 @@ fn live(arguments: &PlayArguments, basis: &Basis<'_>, quiet: bool) -> Result<(),
         // A box that comes later is welcome; one that was asked for by name and is not there is a mistake.
         let mut device = open(&choice, clock, !arguments.device.names_one())?;
         let status = device.device_status();
-        if status.link == sinew_runtime::input::Link::Open {
+        if status.link == sinew_knobs::device::Link::Open {
             say(quiet, &format!("listening to {} ...", status.port));
             heard.knobs = listen(device.as_mut(), clock, &interrupted);
         } else {
@@ -229,7 +260,7 @@ fn live(arguments: &PlayArguments, basis: &Basis<'_>, quiet: bool) -> Result<(),
             );
         }
         let status = device.device_status();
-        heard.identity = (status.link == sinew_runtime::input::Link::Open).then(|| identity(&choice, &status));
+        heard.identity = (status.link == sinew_knobs::device::Link::Open).then(|| identity(&choice, &status));
         heard.name = heard.identity.clone().unwrap_or(status.port);
         heard.device = Some(device);
     }
@@ -256,21 +287,32 @@ fn live(arguments: &PlayArguments, basis: &Basis<'_>, quiet: bool) -> Result<(),
     let mut scene = Scene::new(basis, &mut memory)?;
     let streams = start_streams(arguments, basis)?;
     let tree = wiring.tree.map(|tree| (tree.coarse_knobs, tree.fine_knobs));
-    let labels = Labels::new(title(&arguments.package, basis), basis, &knobs, map.page_count(), tree);
+    let labels = Labels::new(
+        title(arguments.package.as_deref(), basis),
+        basis,
+        &knobs,
+        map.page_count(),
+        tree,
+    );
     let board = Arc::new(Board::new(
         knobs.len(),
         SurfaceLayout::for_map(&map).slot_count,
         basis.component_count(),
     ));
-    let (ask, requests) = unbounded();
+    let (ask, requests) = bounded(REQUESTS_MAX);
     if arguments.typed {
         start_typed_lines(basis, ask.clone()).into_diagnostic()?;
     }
+    let mut router = Router::new(wiring.routes.clone());
+    for knob in &heard.knobs {
+        router.name(knob.address, knob.name.as_deref().unwrap_or(""));
+    }
+    let page = start_page(arguments, bytes, &board, &labels, &ask)?;
     let watcher = Watcher::start(arguments, &board, labels, &ask, quiet)?;
     let mut live = Live {
         clock,
         device: heard.device,
-        router: Router::new(wiring.routes.clone()),
+        router,
         requests,
         streams,
         board: Arc::clone(&board),
@@ -285,6 +327,9 @@ fn live(arguments: &PlayArguments, basis: &Basis<'_>, quiet: bool) -> Result<(),
     };
     let outcome = live.run(&map, wiring.settings, tree, &mut scene);
     watcher.end(&board);
+    if let Some(page) = page {
+        say(quiet, &page.finish().to_string());
+    }
     let outcome = outcome?;
     summarize(&outcome, live, quiet)
 }
@@ -302,11 +347,10 @@ fn summarize(outcome: &LiveOutcome, live: Live<'_>, quiet: bool) -> Result<(), F
     }
     if let Some(device) = &live.device {
         let status = device.device_status();
-        let counts = status.counts;
-        let bad = status.counters;
-        let reason = bad
+        let counts = status.counters;
+        let reason = counts
             .last_fault
-            .filter(|_| bad.bad > 0)
+            .filter(|_| counts.bad > 0)
             .map_or(String::new(), |fault| format!(" (the last: {fault})"));
         say(
             quiet,
@@ -314,10 +358,10 @@ fn summarize(outcome: &LiveOutcome, live: Live<'_>, quiet: bool) -> Result<(), F
                 "{}: {}, {} of them too late to matter; {} refused{reason}; unplugged {}, back {}",
                 status.port,
                 count(counts.events, "reading"),
-                counts.dropped,
+                status.replaced,
                 count(counts.bad, "message"),
-                count(counts.unplugs, "time"),
-                count(counts.replugs, "time")
+                count(status.unplugs, "time"),
+                count(status.replugs, "time")
             ),
         );
     }

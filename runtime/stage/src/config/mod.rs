@@ -10,8 +10,8 @@ use core::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
 use miette::{IntoDiagnostic, Report, WrapErr};
-use sinew_runtime::input::protocol::MidiSettings;
-use sinew_runtime::input::{Centre, Command, Curve, Failsafe, FullScale, Protocol, Smoothing, Takeover};
+use sinew_knobs::protocol::MidiSettings;
+use sinew_knobs::{Centre, Command, Curve, Failsafe, FullScale, Protocol, Smoothing, Takeover};
 use toml::de::DeTable;
 
 pub use error::ConfigError;
@@ -59,8 +59,18 @@ pub struct DeviceChoice {
     pub full_scale: FullScale,
     /// Encoders and pairs of controllers.
     pub midi_settings: MidiSettings,
-    /// Whether readings are corrected for a sagging supply; `None`: as its calibration found.
-    pub follow_supply: Option<bool>,
+    /// Whether a reading far from the last waits for a second; `None`: where nothing checks the bytes.
+    pub spike_guard: Option<bool>,
+}
+
+impl DeviceChoice {
+    /// Whether a reading far from the last waits for a second: on serial lines, unless the file says otherwise or names a protocol
+    /// with checksums. MIDI ports and datagrams come whole or not at all.
+    pub fn guards_against_spikes(&self) -> bool {
+        let is_serial = self.midi.is_none() && self.osc.is_none();
+        let checks = matches!(self.protocol, Some(Protocol::Packets));
+        self.spike_guard.unwrap_or(is_serial && !checks)
+    }
 }
 
 /// How a control answers, as far as it was said.
@@ -117,6 +127,8 @@ pub struct KnobEntry {
     pub name: String,
     /// Travel of an encoder's step.
     pub step: Option<f32>,
+    /// How many times further a step goes when the encoder is spun.
+    pub acceleration: Option<f32>,
     /// How it is smoothed.
     pub smoothing: Option<Smoothing>,
     /// What it moves.

@@ -1,7 +1,7 @@
 //! From the tables of `knobs.toml` to a [`KnobsFile`]: every key, what it may be, and what it may not stand beside.
 
-use sinew_runtime::input::protocol::{Coding, MidiSettings, Pairing};
-use sinew_runtime::input::{Centre, Command, Curve, Failsafe, FullScale, Protocol, Smoothing, Takeover};
+use sinew_knobs::protocol::{Coding, MidiSettings, Pairing};
+use sinew_knobs::{Centre, Command, Curve, Failsafe, FullScale, Protocol, Smoothing, Takeover};
 
 use super::keys::{Fault, Found, Keys, WholeOrText, nearest};
 use super::{
@@ -93,7 +93,6 @@ fn device_choice(mut keys: Keys<'_>) -> Result<DeviceChoice, Fault> {
     if let Some(full_scale) = keys.small("full_scale", 1..=u16::MAX)? {
         device.full_scale = FullScale::Fixed(full_scale.value);
     }
-    device.follow_supply = keys.flag("follow_supply")?;
     if let Some(coding) = keys.word("encoders", &CODINGS)? {
         device.midi_settings.set_all_codings(coding);
     }
@@ -105,6 +104,7 @@ fn device_choice(mut keys: Keys<'_>) -> Result<DeviceChoice, Fault> {
     if let Some(pairing) = keys.word("pairs", &pairings)? {
         device.midi_settings.pairing = pairing;
     }
+    device.spike_guard = keys.flag("spike_guard")?;
     keys.finish()?;
     Ok(device)
 }
@@ -288,6 +288,7 @@ fn read_knob(mut keys: Keys<'_>, midi: &mut MidiSettings, under: Smoothing) -> R
     let place = place(&mut keys, "[[knob]]")?;
     let name = keys.text("name")?.map_or(String::new(), |found| found.value.to_owned());
     let step = keys.number("step", 1e-6..=1.0)?.map(|found| found.value);
+    let acceleration = keys.number("acceleration", 1.0..=100.0)?.map(|found| found.value);
     let smoothing = smoothing(&mut keys, under)?;
     if let Some(coding) = keys.word("encoder", &CODINGS)? {
         let Place::Number(address) = place.value else {
@@ -324,6 +325,7 @@ fn read_knob(mut keys: Keys<'_>, midi: &mut MidiSettings, under: Smoothing) -> R
         place,
         name,
         step,
+        acceleration,
         smoothing,
         controls,
     })

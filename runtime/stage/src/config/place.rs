@@ -1,6 +1,6 @@
 //! How a file names a knob: by its number, by its MIDI message, or by what the device itself calls it.
 
-use sinew_runtime::input::protocol::{KNOB_NOTE, KNOB_PITCH_BEND};
+use sinew_knobs::protocol::{KNOB_NOTE, KNOB_PITCH_BEND};
 
 use super::keys::WholeOrText;
 

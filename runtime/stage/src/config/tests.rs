@@ -30,6 +30,14 @@ fn nothing_said_is_the_default() {
 }
 
 #[test]
+fn the_guide_to_a_first_box_has_a_button_that_stops() {
+    let guide = include_str!("../../../../docs/first-box.md");
+    let (_, behind) = guide.split_once("```toml\n").unwrap();
+    let file = parse(behind.split("```").next().unwrap()).unwrap();
+    assert_eq!(file.buttons.len(), 1);
+}
+
+#[test]
 fn the_documented_example_says_what_it_claims() {
     let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/knobs.toml"));
     let file = KnobsFile::read(path).unwrap();

@@ -4,7 +4,8 @@ use core::net::{Ipv4Addr, SocketAddr};
 
 use clap::Args;
 use miette::{Report, miette};
-use sinew_runtime::input::{Clock, DeviceStatus, FullScale, Protocol, Settings};
+use sinew_knobs::device::{Clock, DeviceStatus};
+use sinew_knobs::{DecoderSettings, FullScale, Protocol};
 
 use super::Device;
 use crate::config::DeviceChoice;
@@ -85,9 +86,10 @@ impl DeviceArguments {
 /// # Errors
 /// The port is not there, is busy or forbidden; this build has no such devices.
 pub fn open(choice: &DeviceChoice, clock: Clock, wait: bool) -> Result<Box<dyn Device>, Report> {
-    let decoding = Settings {
+    let decoding = DecoderSettings {
         full_scale: choice.full_scale,
         midi: choice.midi_settings,
+        ..DecoderSettings::default()
     };
     if let Some(name) = &choice.midi {
         return open_midi(name, decoding, clock, wait);
@@ -99,8 +101,13 @@ pub fn open(choice: &DeviceChoice, clock: Clock, wait: bool) -> Result<Box<dyn D
 }
 
 #[cfg(feature = "serial")]
-fn open_serial(choice: &DeviceChoice, decoding: Settings, clock: Clock, wait: bool) -> Result<Box<dyn Device>, Report> {
-    use sinew_runtime::input::{SerialSelector, SerialSettings, SerialSource};
+fn open_serial(
+    choice: &DeviceChoice,
+    decoding: DecoderSettings,
+    clock: Clock,
+    wait: bool,
+) -> Result<Box<dyn Device>, Report> {
+    use sinew_knobs::device::{SerialSelector, SerialSettings, SerialSource};
     let selector = choice
         .serial
         .as_ref()
@@ -118,15 +125,15 @@ fn open_serial(choice: &DeviceChoice, decoding: Settings, clock: Clock, wait: bo
 }
 
 #[cfg(not(feature = "serial"))]
-fn open_serial(_: &DeviceChoice, _: Settings, _: Clock, _: bool) -> Result<Box<dyn Device>, Report> {
+fn open_serial(_: &DeviceChoice, _: DecoderSettings, _: Clock, _: bool) -> Result<Box<dyn Device>, Report> {
     Err(miette!(
         "this build reads no serial ports: build it with --features serial"
     ))
 }
 
 #[cfg(feature = "midi")]
-fn open_midi(name: &str, decoding: Settings, clock: Clock, wait: bool) -> Result<Box<dyn Device>, Report> {
-    use sinew_runtime::input::{MidiPortSettings, MidiSource};
+fn open_midi(name: &str, decoding: DecoderSettings, clock: Clock, wait: bool) -> Result<Box<dyn Device>, Report> {
+    use sinew_knobs::device::{MidiPortSettings, MidiSource};
     let settings = MidiPortSettings {
         decoding,
         wait,
@@ -137,13 +144,13 @@ fn open_midi(name: &str, decoding: Settings, clock: Clock, wait: bool) -> Result
 }
 
 #[cfg(not(feature = "midi"))]
-fn open_midi(_: &str, _: Settings, _: Clock, _: bool) -> Result<Box<dyn Device>, Report> {
+fn open_midi(_: &str, _: DecoderSettings, _: Clock, _: bool) -> Result<Box<dyn Device>, Report> {
     Err(miette!("this build reads no MIDI ports: build it with --features midi"))
 }
 
 #[cfg(feature = "osc")]
-fn open_osc(address: SocketAddr, decoding: Settings, clock: Clock) -> Result<Box<dyn Device>, Report> {
-    use sinew_runtime::input::{OscSettings, OscSource};
+fn open_osc(address: SocketAddr, decoding: DecoderSettings, clock: Clock) -> Result<Box<dyn Device>, Report> {
+    use sinew_knobs::device::{OscSettings, OscSource};
     let settings = OscSettings {
         address,
         decoding,
@@ -154,7 +161,7 @@ fn open_osc(address: SocketAddr, decoding: Settings, clock: Clock) -> Result<Box
 }
 
 #[cfg(not(feature = "osc"))]
-fn open_osc(_: SocketAddr, _: Settings, _: Clock) -> Result<Box<dyn Device>, Report> {
+fn open_osc(_: SocketAddr, _: DecoderSettings, _: Clock) -> Result<Box<dyn Device>, Report> {
     Err(miette!("this build takes no OSC: build it with --features osc"))
 }
 
@@ -172,7 +179,7 @@ pub fn identity(choice: &DeviceChoice, status: &DeviceStatus) -> String {
 
 #[cfg(feature = "serial")]
 fn usb_identity(path: &str) -> Option<String> {
-    let ports = sinew_runtime::input::serial_ports().ok()?;
+    let ports = sinew_knobs::device::serial_ports().ok()?;
     let usb = ports.into_iter().find(|port| port.path == path)?.usb?;
     let number = usb.serial_number.map_or(String::new(), |number| format!(" {number}"));
     Some(format!("usb {:04x}:{:04x}{number}", usb.vendor_id, usb.product_id))

@@ -4,7 +4,8 @@
 use core::time::Duration;
 use std::thread;
 
-use sinew_runtime::input::{Clock, SourceEvent};
+use sinew_knobs::SourceEvent;
+use sinew_knobs::device::Clock;
 
 use super::Device;
 use crate::wiring::HeardKnob;

@@ -5,7 +5,8 @@ mod choice;
 mod listen;
 mod touch;
 
-use sinew_runtime::input::{ControlSource, DeviceStatus};
+use sinew_knobs::ControlSource;
+use sinew_knobs::device::DeviceStatus;
 
 pub use choice::{DeviceArguments, identity, open, parse_osc};
 pub use listen::listen;
@@ -15,33 +16,24 @@ pub use touch::Touch;
 pub trait Device: ControlSource {
     /// Everything known of it. Allocates: a few times a second at most.
     fn device_status(&self) -> DeviceStatus;
-
-    /// What it calls a knob.
-    fn knob_name(&self, knob: u16) -> Option<String> {
-        let names = self.device_status().names;
-        names
-            .into_iter()
-            .find(|named| named.knob == knob)
-            .map(|named| named.name)
-    }
 }
 
 #[cfg(feature = "serial")]
-impl Device for sinew_runtime::input::SerialSource {
+impl Device for sinew_knobs::device::SerialSource {
     fn device_status(&self) -> DeviceStatus {
         Self::device_status(self)
     }
 }
 
 #[cfg(feature = "midi")]
-impl Device for sinew_runtime::input::MidiSource {
+impl Device for sinew_knobs::device::MidiSource {
     fn device_status(&self) -> DeviceStatus {
         Self::device_status(self)
     }
 }
 
 #[cfg(feature = "osc")]
-impl Device for sinew_runtime::input::OscSource {
+impl Device for sinew_knobs::device::OscSource {
     fn device_status(&self) -> DeviceStatus {
         Self::device_status(self)
     }

@@ -1,6 +1,6 @@
 //! Which knob a hand is turning: the first that has gone a clear way from where it stood.
 
-use sinew_runtime::input::{KnobEvent, Reading};
+use sinew_knobs::{KnobEvent, Reading};
 
 /// Way that counts as a turn, parts of the full scale. Noise and a sagging supply stay under it.
 const TURN: f32 = 0.12;

@@ -7,19 +7,20 @@ use std::sync::Arc;
 
 use crossbeam::channel::Receiver;
 use miette::{IntoDiagnostic, Report, WrapErr};
-use sinew_runtime::Basis;
-use sinew_runtime::input::{
-    Clock, Command, ControlMap, ControlSurface, KnobEvent, KnobState, Reading, SlotState, SourceEvent, SurfaceLayout,
-    SurfaceSettings, TreeView,
+use sinew_knobs::device::Clock;
+use sinew_knobs::take::{Record, TakeWriter};
+use sinew_knobs::{
+    Command, ControlMap, ControlSurface, KnobEvent, Reading, SourceEvent, SurfaceBuffers, SurfaceSettings, TreeView,
 };
-use sinew_runtime::take::{Record, TakeWriter};
+use sinew_runtime::Basis;
 
+use super::follow::Follow;
 use super::scene::Scene;
 use super::take_file::{CHUNK_BYTES, TakeFile, TakeSummary, free_name};
 use crate::checksum::WeightsChecksum;
 use crate::device::Device;
 use crate::pace::Pace;
-use crate::snapshot::{Board, Rates, Recording, Request};
+use crate::snapshot::{Board, REQUESTS_MAX, Rates, Recording, Request};
 use crate::stream::Stream;
 use crate::wiring::Router;
 
@@ -111,7 +112,7 @@ impl Carried {
                     *last = Some(reading);
                 }
             }
-            SourceEvent::Knob(_) => {}
+            SourceEvent::Knob(_) | SourceEvent::Named { .. } => {}
             SourceEvent::Unplugged => {
                 self.lost = true;
                 self.readings.iter_mut().for_each(|(_, last)| *last = None);
@@ -175,17 +176,16 @@ impl Live<'_> {
         tree: Option<(u16, u16)>,
         scene: &mut Scene<'_>,
     ) -> Result<LiveOutcome, Report> {
-        let layout = SurfaceLayout::for_map(map);
         let mut carried = Carried::new(map);
+        let mut follow = Follow::new(map.basis().component_count());
         let mut outcome = LiveOutcome::default();
         let mut pace = Pace::new(self.clock, self.fps);
         let mut events = Vec::with_capacity(EVENTS);
         let mut wanted = self.record.clone();
         let mut asked_later = false;
         loop {
-            let mut knobs = vec![KnobState::default(); layout.knob_count];
-            let mut slots = vec![SlotState::default(); layout.slot_count];
-            let mut surface = ControlSurface::new(*map, settings, &mut knobs, &mut slots).into_diagnostic()?;
+            let mut buffers = SurfaceBuffers::for_map(map);
+            let mut surface = ControlSurface::new(*map, settings, buffers.memory()).into_diagnostic()?;
             let file = match wanted.take().map(|path| TakeFile::create(&path)).transpose() {
                 // Asked for in the middle of a show, which must not end for it.
                 Err(report) if asked_later => {
@@ -220,6 +220,7 @@ impl Live<'_> {
                 take: &mut take,
                 file: file.as_ref(),
                 carried: &mut carried,
+                follow: &mut follow,
                 checksum: WeightsChecksum::default(),
                 whole: &mut outcome.checksum,
                 fault: outcome.faults.last().map(String::as_str),
@@ -269,6 +270,7 @@ struct Segment<'p, 'l, 'm, 's, 'b, S: FnMut(&[u8])> {
     take: &'p mut Option<TakeWriter<'b, S>>,
     file: Option<&'p TakeFile>,
     carried: &'p mut Carried,
+    follow: &'p mut Follow,
     checksum: WeightsChecksum,
     whole: &'p mut WeightsChecksum,
     /// What went wrong with the last recording.
@@ -289,6 +291,7 @@ impl<S: FnMut(&[u8])> Segment<'_, '_, '_, '_, '_, S> {
             if let Some(end) = self.requests(now_us) {
                 return Ok(end);
             }
+            self.follow(now_us);
             self.device_events(now_us, events);
             self.surface
                 .advance(now_us, &mut self.scene.controls)
@@ -320,20 +323,21 @@ impl<S: FnMut(&[u8])> Segment<'_, '_, '_, '_, '_, S> {
     }
 
     fn requests(&mut self, now_us: u64) -> Option<End> {
-        while let Ok(request) = self.live.requests.try_recv() {
+        for _ in 0..REQUESTS_MAX {
+            let Ok(request) = self.live.requests.try_recv() else {
+                break;
+            };
             match request {
                 Request::Quit => return Some(End::Over),
                 Request::Record => return Some(End::Record),
                 Request::Command(command) => self.command(now_us, command),
                 Request::StopOrRelease if self.carried.stopped => self.command(now_us, Command::Release),
                 Request::StopOrRelease => self.command(now_us, Command::Stop),
-                Request::Weight { control, weight } => self.weight(now_us, control, weight),
+                Request::Weight { control, weight } => self.follow.ask(control, weight, &self.scene.controls),
+                // A stop that is released at once: everything eases to rest, and goes on from there.
                 Request::Rest => {
-                    for k in 0..self.scene.basis.component_count() {
-                        if self.scene.controls.weights()[k] != 0.0 {
-                            self.weight(now_us, k as u16, 0.0);
-                        }
-                    }
+                    self.command(now_us, Command::Stop);
+                    self.command(now_us, Command::Release);
                 }
             }
         }
@@ -350,11 +354,19 @@ impl<S: FnMut(&[u8])> Segment<'_, '_, '_, '_, '_, S> {
         self.record(now_us, Record::Command(command));
     }
 
-    fn weight(&mut self, now_us: u64, control: u16, weight: f32) {
-        // What asks names components of this package and finite weights.
-        if let Ok(weight) = self.scene.controls.set(control.into(), weight) {
-            self.record(now_us, Record::Weight { control, weight });
+    /// What people asked for past the knobs.
+    fn follow(&mut self, now_us: u64) {
+        if self.surface.is_stopped() {
+            self.follow.forget();
         }
+        let (surface, take) = (&*self.surface, &mut *self.take);
+        let slew = |control| surface.slew_limit(control);
+        self.follow
+            .advance(now_us, &mut self.scene.controls, slew, |control, weight| {
+                if let Some(take) = take {
+                    take.record(now_us, Record::Weight { control, weight });
+                }
+            });
     }
 
     fn device_events(&mut self, now_us: u64, events: &mut Vec<(u64, SourceEvent)>) {
@@ -363,8 +375,12 @@ impl<S: FnMut(&[u8])> Segment<'_, '_, '_, '_, '_, S> {
         device.poll(now_us, &mut |at_us, event| events.push((at_us, event)));
         for &(at_us, event) in &*events {
             let event = match event {
+                SourceEvent::Named { knob, name } => {
+                    self.live.router.name(knob, name.as_str());
+                    continue;
+                }
                 SourceEvent::Knob(event) => {
-                    let knob = self.live.router.route(event.knob, |knob| device.knob_name(knob));
+                    let knob = self.live.router.route(event);
                     SourceEvent::Knob(KnobEvent { knob, ..event })
                 }
                 other => other,
@@ -391,9 +407,6 @@ impl<S: FnMut(&[u8])> Segment<'_, '_, '_, '_, '_, S> {
         if due {
             self.words_us = now_us.max(1);
             words = self.live.device.as_ref().map(|device| device.device_status());
-            if let Some(device) = &self.live.device {
-                self.live.router.refresh(|knob| device.knob_name(knob));
-            }
             trouble = trouble.or_else(|| self.file.and_then(TakeFile::fault));
             trouble = trouble.or_else(|| {
                 let named = |stream: &Stream| stream.fault().map(|fault| format!("a stream ended: {fault}"));

@@ -7,11 +7,10 @@ use std::thread;
 
 use crossbeam::channel::Receiver;
 use miette::{IntoDiagnostic, Report, WrapErr};
+use sinew_knobs::device::Clock;
+use sinew_knobs::take::{Take, TakeFrames};
+use sinew_knobs::{Binding, Button, Command, ControlMap, ControlSurface, Knob, OnPage, SurfaceBuffers};
 use sinew_runtime::Basis;
-use sinew_runtime::input::{
-    Binding, Button, Clock, Command, ControlMap, ControlSurface, Knob, KnobState, OnPage, SlotState, SurfaceLayout,
-};
-use sinew_runtime::take::{Take, TakeFrames};
 
 use super::scene::Scene;
 use crate::checksum::WeightsChecksum;
@@ -122,10 +121,8 @@ impl Replay<'_> {
         map: &ControlMap<'_>,
         scene: &mut Scene<'_>,
     ) -> Result<ReplayOutcome, Report> {
-        let layout = SurfaceLayout::for_map(map);
-        let mut knobs = vec![KnobState::default(); layout.knob_count];
-        let mut slots = vec![SlotState::default(); layout.slot_count];
-        let mut surface = ControlSurface::new(*map, take.settings(), &mut knobs, &mut slots).into_diagnostic()?;
+        let mut buffers = SurfaceBuffers::for_map(map);
+        let mut surface = ControlSurface::new(*map, take.settings(), buffers.memory()).into_diagnostic()?;
         let mut frames = match self.fps {
             Some(fps) => TakeFrames::new(take, (1e6 / fps).round() as u64),
             None => TakeFrames::recorded(take),

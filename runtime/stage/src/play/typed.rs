@@ -4,8 +4,8 @@ use std::io::BufRead;
 use std::thread;
 
 use crossbeam::channel::Sender;
+use sinew_knobs::Command;
 use sinew_runtime::Basis;
-use sinew_runtime::input::Command;
 
 use crate::config::COMMANDS;
 use crate::config::keys::nearest;

@@ -4,7 +4,7 @@ use core::net::Ipv4Addr;
 use core::time::Duration;
 use std::net::UdpSocket;
 
-use sinew_formats::interchange::read_sequence;
+use sinew_interchange::{Choice, read_sequence};
 
 use super::*;
 
@@ -44,7 +44,9 @@ fn obj_files_are_numbered_or_replaced() {
     let out = folder.path().join("frames");
     let summary = play(StreamSpec::ObjFolder(out.clone()), 3);
     assert_eq!((summary.sent, summary.dropped, summary.fault), (3, 0, None));
-    let read = read_sequence(&out, &mut |_, _| {}).unwrap().sequence;
+    let read = read_sequence(&out, &Choice::default(), &mut |_, _| {})
+        .unwrap()
+        .sequence;
     assert_eq!(read.shapes.len(), 3);
     assert_eq!(read.shapes[2], shape(3));
     assert_eq!(read.faces, FACES);

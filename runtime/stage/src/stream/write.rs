@@ -7,7 +7,7 @@ use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
 
 use miette::{IntoDiagnostic, Report, WrapErr};
-use sinew_formats::interchange::write_obj;
+use sinew_interchange::{OutputSurface, write_obj};
 
 use super::packets::{Kind, write_datagrams};
 use super::{Shape, StreamSpec};
@@ -91,10 +91,10 @@ impl Sink {
     /// Writes a frame.
     pub fn write(&mut self, shape: &Shape) -> Result<(), String> {
         match self {
-            Self::Obj { path, faces } => write_obj(path, &shape.positions, faces).map_err(|error| error.to_string()),
+            Self::Obj { path, faces } => write_shape(path, shape, faces),
             Self::ObjFolder { folder, faces } => {
                 let path = folder.join(format!("frame_{:06}.obj", shape.frame));
-                write_obj(&path, &shape.positions, faces).map_err(|error| error.to_string())
+                write_shape(&path, shape, faces)
             }
             Self::Raw(out) => write_raw_frame(out, shape).map_err(|error| error.to_string()),
             Self::Udp { socket, kind, buffer } => {
@@ -126,6 +126,11 @@ impl Sink {
             _ => Ok(()),
         }
     }
+}
+
+fn write_shape(path: &Path, shape: &Shape, faces: &[[u32; 3]]) -> Result<(), String> {
+    let surface = OutputSurface::bare("", shape.positions.len(), faces);
+    write_obj(path, &shape.positions, &surface).map_err(|error| error.to_string())
 }
 
 fn write_raw_head(out: &mut dyn Write, vertex_count: usize, faces: &[[u32; 3]]) -> io::Result<()> {

@@ -5,7 +5,7 @@ use ratatui::layout::Rect;
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
-use sinew_runtime::input::TakeoverState;
+use sinew_knobs::TakeoverState;
 
 use super::words;
 use crate::count::count;

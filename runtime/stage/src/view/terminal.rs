@@ -7,7 +7,7 @@ use std::thread::{self, JoinHandle};
 
 use crossbeam::channel::Sender;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
-use sinew_runtime::input::Command;
+use sinew_knobs::Command;
 
 use super::draw;
 use crate::snapshot::{Board, Labels, Request};
@@ -41,10 +41,7 @@ pub fn start_terminal(
         };
         let outcome = run();
         ratatui::restore();
-        if outcome.is_err() {
-            // Nobody could end it by a key any more.
-            let _ = requests.send(Request::Quit);
-        }
+        // A terminal that fails is no reason to end a show: Ctrl-C, its signals and the page are still there.
         outcome
     });
     if spawned.is_err() {
@@ -61,7 +58,8 @@ fn request(key: KeyEvent) -> Option<Request> {
     let control = key.modifiers.contains(KeyModifiers::CONTROL);
     Some(match key.code {
         KeyCode::Char('c') if control => Request::Quit,
-        KeyCode::Char('q') | KeyCode::Esc => Request::Quit,
+        // Not Esc: a slow line cuts the code of an arrow key into an Esc and the rest.
+        KeyCode::Char('q') => Request::Quit,
         KeyCode::Char(' ') => Request::StopOrRelease,
         KeyCode::Char('r') => Request::Record,
         KeyCode::Char('0') => Request::Rest,
@@ -86,6 +84,7 @@ mod tests {
         assert_eq!(press(KeyCode::Right), Some(Request::Command(Command::Next)));
         assert_eq!(press(KeyCode::Down), Some(Request::Command(Command::Into)));
         assert_eq!(press(KeyCode::Char('c')), None);
+        assert_eq!(press(KeyCode::Esc), None);
         let interrupt = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
         assert_eq!(request(interrupt), Some(Request::Quit));
         let release = KeyEvent::new_with_kind(KeyCode::Char('q'), KeyModifiers::NONE, KeyEventKind::Release);

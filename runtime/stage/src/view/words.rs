@@ -1,8 +1,9 @@
 //! A snapshot in words: what a knob waits for, what the device is and what is wrong. The same for the terminal view and the
 //! status lines.
 
-use sinew_runtime::input::protocol::Recognition;
-use sinew_runtime::input::{DeviceStatus, Direction, Link, TakeoverState};
+use sinew_knobs::device::{DeviceStatus, Link};
+use sinew_knobs::protocol::Recognition;
+use sinew_knobs::{Direction, TakeoverState};
 
 use crate::count::count;
 use crate::snapshot::{Labels, Snapshot};
@@ -119,9 +120,6 @@ pub fn warnings(snapshot: &Snapshot) -> Vec<String> {
             "{} of knobs that the map has not",
             count(snapshot.surface.unlisted, "reading")
         ));
-    }
-    if snapshot.surface.supply > 0.0 && snapshot.surface.supply < 0.98 {
-        warnings.push(format!("the supply sagged to {:.0} %", snapshot.surface.supply * 100.0));
     }
     if snapshot.stream_dropped > 0 {
         warnings.push(format!(

@@ -2,8 +2,8 @@
 
 use core::ops::Range;
 
+use sinew_knobs::{Binding, Button, Command, OnPage, Response, SurfaceSettings, TreePages};
 use sinew_runtime::Basis;
-use sinew_runtime::input::{Binding, Button, Command, OnPage, Response, SurfaceSettings, TreePages};
 
 use super::{HeardKnob, WiredKnob, Wiring, split};
 use crate::calibration::DeviceCalibration;
@@ -52,11 +52,7 @@ impl Resolver<'_> {
     fn run(&mut self) -> Result<(), Fault> {
         self.wiring.settings = SurfaceSettings {
             failsafe: self.file.failsafe,
-            follow_supply: self
-                .file
-                .device
-                .follow_supply
-                .unwrap_or(self.calibration.is_some_and(|device| device.follow_supply)),
+            spike_guard: self.file.device.guards_against_spikes(),
         };
         self.check_places()?;
         let has_controls = self.file.knobs.iter().any(|knob| !knob.controls.is_empty());
@@ -208,6 +204,7 @@ impl Resolver<'_> {
             calibration: self.calibration.and_then(|device| device.of(number, name)),
             smoothing: entry.and_then(|entry| entry.smoothing).unwrap_or(self.file.smoothing),
             step: entry.and_then(|entry| entry.step).unwrap_or(0.01),
+            acceleration: entry.and_then(|entry| entry.acceleration).unwrap_or(1.0),
         };
         self.wiring.knobs.push(knob);
         self.places.push(place);
@@ -304,7 +301,7 @@ impl Resolver<'_> {
             let address = self.wiring.routes.address_of(&entry.place.value);
             buttons.push(Button { address, command });
         }
-        if let Some(entry) = file.buttons.get(sinew_runtime::input::BUTTONS_MAX) {
+        if let Some(entry) = file.buttons.get(sinew_knobs::BUTTONS_MAX) {
             return Err(Fault::new(entry.place.span.clone(), "a device has at most 64 buttons"));
         }
         self.wiring.buttons = buttons;

@@ -1,7 +1,7 @@
 //! How many of the knobs at hand are for coarse components.
 
+use sinew_knobs::TreePages;
 use sinew_runtime::Basis;
-use sinew_runtime::input::TreePages;
 
 /// Coarse and fine knobs out of `knob_count`: what the mapping file says, and [`TreePages::share`] where it says nothing.
 pub fn split(basis: &Basis<'_>, knob_count: u16, coarse: Option<u16>, fine: Option<u16>) -> (u16, u16) {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use sinew_bake::{bake_bytes, fixture};
 use sinew_formats::package::AlignedBytes;
-use sinew_runtime::input::{Command, KnobCalibration, OnPage};
+use sinew_knobs::{Command, KnobCalibration, KnobEvent, OnPage, Reading};
 
 use super::*;
 use crate::calibration::{CalibratedKnob, DeviceCalibration};
@@ -169,7 +169,6 @@ fn calibrations_follow_names_and_make_knobs_known() {
     };
     let device = DeviceCalibration {
         device: "x".to_owned(),
-        follow_supply: true,
         knobs: vec![knob(0, "", 10), knob(6, "", 16), knob(3, "jaw", 13)],
     };
     let wiring = resolve(
@@ -185,13 +184,18 @@ fn calibrations_follow_names_and_make_knobs_known() {
         .map(|knob| knob.calibration.map(|c| c.lowest))
         .collect();
     assert_eq!(lowest, [Some(13), Some(10), None, Some(16)]);
-    assert!(wiring.settings.follow_supply);
-    assert!(
-        !resolve(&file("[device]\nfollow_supply = false"), &basis, &[], Some(&device))
-            .unwrap()
-            .settings
-            .follow_supply
-    );
+}
+
+fn at(knob: u16, value: u16) -> KnobEvent {
+    let full_scale = 127;
+    KnobEvent {
+        knob,
+        reading: Reading::Position { value, full_scale },
+    }
+}
+
+fn turned(knob: u16) -> KnobEvent {
+    at(knob, 64)
 }
 
 #[test]
@@ -204,18 +208,19 @@ fn the_router_gives_each_knob_its_place_once() {
         panic!()
     };
     let mut router = Router::new(wiring.routes.clone());
-    let name_of = |knob: u16| (knob == 7).then(|| "jaw".to_owned());
-    assert_eq!(router.route(4, name_of), 4);
-    assert_eq!(router.route(7, name_of), named.1);
+    router.name(7, "jaw");
+    assert_eq!((router.route(turned(4)), router.route(turned(7))), (4, named.1));
     let free = &wiring.routes.free;
-    assert_eq!(free.len(), 2);
     assert_eq!(
-        [router.route(30, name_of), router.route(2, name_of)],
-        [free[0], free[1]]
+        [router.route(at(20, 127)), router.route(at(20, 0))],
+        [20, 20],
+        "a button takes no knob's place"
     );
-    assert_eq!(router.route(30, name_of), free[0], "it keeps it");
-    assert_eq!(router.route(9, name_of), 9, "no room: it is what it is");
+    assert_eq!(free.len(), 2);
+    assert_eq!([router.route(turned(30)), router.route(turned(2))], [free[0], free[1]]);
+    assert_eq!(router.route(turned(30)), free[0], "it keeps it");
+    assert_eq!(router.route(turned(9)), 9, "no room: it is what it is");
     // A name that comes late.
-    router.refresh(|knob| (knob == 9).then(|| "jaw".to_owned()));
-    assert_eq!(router.route(9, name_of), named.1);
+    router.name(9, "jaw");
+    assert_eq!(router.route(turned(9)), named.1);
 }

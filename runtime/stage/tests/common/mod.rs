@@ -1,4 +1,5 @@
 //! What the tests of the command share: packages, a simulated box, and the command itself.
+#![allow(dead_code, reason = "every test uses a part of it")]
 
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -3,15 +3,15 @@
 //!
 //! Bytes of an input: settings, length of the pieces, then what the device sends.
 
-use sinew_runtime::input::{
-    Decoder, FullScale, KnobEvent, Protocol, Reading, Settings,
+use sinew_knobs::{
+    Decoder, DecoderSettings, FullScale, KnobEvent, Protocol, Reading,
     protocol::{Coding, Pairing},
 };
 
 /// Checks one parser on an input; with no protocol named, the sniffer.
 pub fn check(protocol: Option<Protocol>, data: &[u8]) {
     let [choice, chunk, bytes @ ..] = data else { return };
-    let mut settings = Settings::default();
+    let mut settings = DecoderSettings::default();
     if choice & 1 != 0 {
         settings.full_scale = FullScale::Fixed(u16::from(*choice) * 257);
     }

@@ -40,6 +40,7 @@ fn block(path: &[usize], strengths: &[f32]) -> LearnedBlock {
 #[test]
 fn siblings_are_ordered_by_strength_and_keep_their_children() {
     let mut basis = LearnedBasis {
+        encoder: None,
         rest_positions: vec![[0.0; 3]; 3],
         faces: vec![[0, 1, 2]],
         bridges: Vec::new(),
@@ -47,6 +48,8 @@ fn siblings_are_ordered_by_strength_and_keep_their_children() {
         rotation_scale: 1.0,
         stretch_scale: 1.0,
         render: None,
+        pieces: None,
+        prior: None,
         // A component without a child block, as pruning leaves them, in the middle.
         blocks: vec![
             block(&[], &[0.1, 0.3, 0.2]),

@@ -4,8 +4,8 @@ use sinew_formats::package::{FEATURE_COUNT, GraphConvRecord};
 
 use super::forward::{Source, energies};
 use super::lanes::{
-    Features, LANE_COUNT, Narrow, Registers, add_blend, add_projection, add_scaled, add_transposed, expand, load,
-    scaled, store, sum_features, sum_lanes, tanh_bias, wide, zero,
+    Features, LANE_COUNT, Narrow, Registers, add_blend, add_projection, add_scaled, add_transposed, at_rest, expand,
+    load, scaled, store, sum_features, sum_lanes, wide, zero,
 };
 use super::simd::{Group, Simd};
 use super::sums::ConvolutionSums;
@@ -85,6 +85,7 @@ wide! {
         start: usize,
         source: Source<'_, G>,
         blocks: &[BlockWeights],
+        rest_share: f32,
         residual: &[Features<G>],
         error_gradient: &[Features<G>],
         children: &[Features<G>],
@@ -106,14 +107,10 @@ wide! {
         let mut biases = Vec::with_capacity(block_count);
         for (b, block) in blocks.iter().enumerate() {
             let parent = b / source.child_count;
-            let rest = tanh_bias(simd, &block.decoder.bias);
+            let (rest, slope_at_rest) = at_rest(simd, &block.decoder.bias, rest_share);
             let latents = &mut latent_gradient[b * group_count * component_count..][..group_count * component_count];
             let transposed = &transposed[b * transposed.len() / block_count..(b + 1) * transposed.len() / block_count];
             let mut bias = zero(simd);
-            let mut slope_at_rest = rest;
-            for c in 0..FEATURE_COUNT {
-                slope_at_rest[c] = simd.mul_sub(rest[c], rest[c], one);
-            }
             for (i, hat_gradient) in hat_gradient[b].chunks_exact_mut(width).enumerate() {
                 let v = start + i;
                 let hat = &hat[(b * vertex_count + v) * width..][..width];
@@ -163,6 +160,7 @@ wide! {
         start: usize,
         group_count: usize,
         blocks: &[BlockWeights],
+        rest_share: f32,
         components: &[Features<Narrow>],
         latent_gradient: &[G],
         transposed: &[Narrow],
@@ -176,14 +174,10 @@ wide! {
         let one = simd.splat(1.0);
         let mut biases = Vec::with_capacity(block_count);
         for (b, block) in blocks.iter().enumerate() {
-            let rest = tanh_bias(simd, &block.encoder.bias);
+            let (rest, slope_at_rest) = at_rest(simd, &block.encoder.bias, rest_share);
             let latents = &latent_gradient[b * group_count * component_count..][..group_count * component_count];
             let transposed = &transposed[b * transposed.len() / block_count..(b + 1) * transposed.len() / block_count];
             let mut bias = zero(simd);
-            let mut slope_at_rest = rest;
-            for c in 0..FEATURE_COUNT {
-                slope_at_rest[c] = simd.mul_sub(rest[c], rest[c], one);
-            }
             let components = &components[b * components.len() / block_count..];
             let rows = hidden[b].chunks_exact_mut(group_count);
             let sums = component_gradient[b].chunks_exact_mut(width);

@@ -72,6 +72,8 @@ pub(super) struct LevelView<'a> {
     pub(super) masks: &'a [f32],
     /// Blocks under each block above.
     pub(super) child_count: usize,
+    /// Of the activation: how much of what a bias alone gives is subtracted.
+    pub(super) rest_share: f32,
 }
 
 impl<G: Group> Band<G> {
@@ -144,6 +146,7 @@ impl<G: Group> Band<G> {
                     source,
                     level.ring,
                     blocks,
+                    level.rest_share,
                     &own.components,
                     &mut hidden,
                     &mut latents,
@@ -154,6 +157,7 @@ impl<G: Group> Band<G> {
         fields.latents = add_lanes(&parts, latent_count);
 
         let latents = &fields.latents;
+        let last_group = last_group(level.rest_share, self.shape_count);
         fields
             .residual
             .resize(source.vertex_count() * row_len, [G::ZERO; FEATURE_COUNT]);
@@ -164,7 +168,19 @@ impl<G: Group> Band<G> {
             .map(|(chunk, (mut residual, error))| {
                 let start = chunk * CHUNK;
                 let weights = level.vertex_weights;
-                forward::decode(start, source, blocks, &own.hat, latents, weights, &mut residual, error)
+                let share = level.rest_share;
+                forward::decode(
+                    start,
+                    source,
+                    blocks,
+                    share,
+                    &own.hat,
+                    latents,
+                    weights,
+                    last_group.as_ref(),
+                    &mut residual,
+                    error,
+                )
             })
             .collect();
         losses.iter().map(|&loss| f64::from(loss)).sum()
@@ -276,6 +292,7 @@ impl<G: Group> Band<G> {
                         chunk * CHUNK,
                         source,
                         blocks,
+                        level.rest_share,
                         residual,
                         error,
                         children,
@@ -322,6 +339,7 @@ impl<G: Group> Band<G> {
                         start,
                         group_count,
                         blocks,
+                        level.rest_share,
                         components,
                         z,
                         &transposed,
@@ -350,6 +368,16 @@ impl<G: Group> Band<G> {
             above.residual_gradient = towards_source;
         }
     }
+}
+
+/// Which lanes of the last group hold a shape, as ones, where a lane without one would answer more than zero.
+fn last_group<G: Group>(rest_share: f32, shape_count: usize) -> Option<G> {
+    let used = shape_count % G::LEN;
+    (rest_share != 1.0 && used > 0).then(|| {
+        let mut lanes = G::ZERO;
+        lanes.as_mut()[..used].fill(1.0);
+        lanes
+    })
 }
 
 /// What the level below `above` sees.

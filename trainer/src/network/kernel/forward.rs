@@ -3,13 +3,13 @@
 //! Layout: fields over shapes are `[blocks of the level][V][groups]`, fields over components `[blocks][V][width]` with
 //! width the groups of eight components: what neighbours hold of a block lies close together. A chunk's first vertex is
 //! `start`; its mutable slices begin there, one for each block where the field has blocks; its shared slices begin at
-//! vertex 0. `rest` is tanh of the bias, subtracted so that rest maps to rest.
+//! vertex 0. `rest` is tanh of the bias, subtracted so that rest maps to rest; nothing under the paper's activation.
 
 use sinew_formats::package::FEATURE_COUNT;
 
 use super::lanes::{
-    Features, Narrow, add_blend, add_matrix, add_projection, add_scaled, load, scaled, splat, store, sum_lanes,
-    tanh_bias, tanh_features, wide, zero,
+    Features, Narrow, add_blend, add_matrix, add_projection, add_scaled, at_rest, load, scaled, splat, store,
+    sum_lanes, tanh_features, wide, zero,
 };
 use super::simd::{Group, Simd};
 use crate::network::ring::RingMean;
@@ -60,6 +60,7 @@ wide! {
         source: Source<'_, G>,
         ring: &RingMean,
         blocks: &[BlockWeights],
+        rest_share: f32,
         components: &[Features<Narrow>],
         hidden: &mut [&mut [Features<G>]],
         latents: &mut [G],
@@ -70,7 +71,7 @@ wide! {
         let component_count = latents.len() / (block_count * group_count);
         for (b, block) in blocks.iter().enumerate() {
             let (convolution, parent) = (&block.encoder, b / source.child_count);
-            let rest = tanh_bias(simd, &convolution.bias);
+            let (rest, _) = at_rest(simd, &convolution.bias, rest_share);
             let latents = &mut latents[b * group_count * component_count..][..group_count * component_count];
             for (i, hidden) in hidden[b].chunks_exact_mut(group_count).enumerate() {
                 let v = start + i;
@@ -130,15 +131,18 @@ wide! {
 
 wide! {
     /// `y = tanh(sum_k z_k hat_k + bias) - rest`, `residual = x - y`, `error -= y`; answers the chunk's share of the
-    /// weighted `|x - y|^2`.
+    /// weighted `|x - y|^2`. `last_group`: 1 in the lanes of the last group that hold a shape and 0 in the others, where
+    /// those would not stay zero by themselves.
     fn decode<G>(
         simd,
         start: usize,
         source: Source<'_, G>,
         blocks: &[BlockWeights],
+        rest_share: f32,
         hat: &[Features<Narrow>],
         latents: &[G],
         vertex_weights: &[f32],
+        last_group: Option<&G>,
         residual: &mut [&mut [Features<G>]],
         error: &mut [Features<G>],
     ) -> f32 {
@@ -149,7 +153,7 @@ wide! {
         let mut loss = simd.splat(0.0);
         for (b, block) in blocks.iter().enumerate() {
             let parent = b / source.child_count;
-            let rest = tanh_bias(simd, &block.decoder.bias);
+            let (rest, _) = at_rest(simd, &block.decoder.bias, rest_share);
             let latents = &latents[b * group_count * component_count..][..group_count * component_count];
             let rows = residual[b].chunks_exact_mut(group_count);
             for (i, (residual, error)) in rows.zip(error.chunks_exact_mut(group_count)).enumerate() {
@@ -161,6 +165,11 @@ wide! {
                     let x = scaled(simd, source.mask(v, b), &source.residual(v, parent)[p]);
                     let mut squares = simd.splat(0.0);
                     tanh_features(simd, &mut y);
+                    if let Some(shapes) = last_group.filter(|_| p + 1 == group_count) {
+                        for c in 0..FEATURE_COUNT {
+                            y[c] = simd.mul(y[c], simd.load(shapes));
+                        }
+                    }
                     for c in 0..FEATURE_COUNT {
                         let y = simd.sub(y[c], rest[c]);
                         let difference = simd.sub(x[c], y);

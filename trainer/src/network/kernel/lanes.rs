@@ -227,12 +227,23 @@ pub(crate) fn tanh_features<S: Simd<G>, G>(simd: S, x: &mut Registers<S, G>) {
     }
 }
 
-/// tanh of nine numbers in all lanes: with the same series as everything else rest maps to rest to the last bit.
+/// `tanh(b)` and its slope in all lanes, both times `share`: with the same series as everything else rest maps to rest to the
+/// last bit where the share is one.
 #[inline(always)]
-pub(crate) fn tanh_bias<S: Simd<G>, G>(simd: S, bias: &[f32; FEATURE_COUNT]) -> Registers<S, G> {
+pub(crate) fn at_rest<S: Simd<G>, G>(
+    simd: S,
+    bias: &[f32; FEATURE_COUNT],
+    share: f32,
+) -> (Registers<S, G>, Registers<S, G>) {
+    let (one, share) = (simd.splat(1.0), simd.splat(share));
     let mut rest = splat(simd, bias);
     tanh_features(simd, &mut rest);
-    rest
+    let mut slope = rest;
+    for c in 0..FEATURE_COUNT {
+        slope[c] = simd.mul(share, simd.mul_sub(rest[c], rest[c], one));
+        rest[c] = simd.mul(share, rest[c]);
+    }
+    (rest, slope)
 }
 
 /// Defines a pass over groups of `G`, compiled for the widest instructions at hand: `simd`, of type `S`, stands for them

@@ -23,6 +23,7 @@ use self::band::{Band, LevelView};
 use self::lanes::{Narrow, WIDE_LANE_COUNT, Wide, has_wide_lanes};
 use self::layout::shapes_from_lanes;
 use self::level::Level;
+use super::activation::Activation;
 use super::attention::Attention;
 use super::loss::{LossSettings, LossTerms, sparsity};
 use super::ring::RingMean;
@@ -50,6 +51,7 @@ pub struct Kernel {
     /// In the order of rows. Shape: `[V]`.
     vertex_weights: Vec<f32>,
     attention: Attention,
+    activation: Activation,
     modes: Modes,
     /// The root's masks: it sees all. Shape: `[V]`.
     ones: Vec<f32>,
@@ -72,7 +74,13 @@ pub struct StackOutput {
 impl Kernel {
     /// `vertex_weights`: shape `[V]`, areas with mean one. `modes`: the g_i of the position term, shape `[I][V][9]`, or
     /// empty. Both must fit the ring's V.
-    pub fn new(ring: RingMean, vertex_weights: &[f32], modes: &[f32], attention: Attention) -> Self {
+    pub fn new(
+        ring: RingMean,
+        vertex_weights: &[f32],
+        modes: &[f32],
+        attention: Attention,
+        activation: Activation,
+    ) -> Self {
         let order = ring.breadth_first_order();
         let len = ring.vertex_count() * FEATURE_COUNT;
         let mode_count = modes.len() / len;
@@ -86,6 +94,7 @@ impl Kernel {
             ring: ring.reordered(&order),
             vertex_weights: order.iter().map(|&v| vertex_weights[v as usize]).collect(),
             attention,
+            activation,
             modes: Modes {
                 count: mode_count,
                 values: transposed,
@@ -198,6 +207,7 @@ impl Kernel {
                 vertex_weights: &self.vertex_weights,
                 masks: above.last().map_or(&self.ones, |above| &above.masks),
                 child_count: child_count(weights, l),
+                rest_share: self.activation.rest_share(),
             };
             loss += self.wide.forward(l, view, &rest[0]);
             loss += self.narrow.forward(l, view, &rest[0]);
@@ -229,6 +239,7 @@ impl Kernel {
                 vertex_weights: &self.vertex_weights,
                 masks,
                 child_count: child_count(weights, l),
+                rest_share: self.activation.rest_share(),
             };
             let is_first = self.wide.shape_count == 0;
             self.wide.decode_back(l, view, own, mask_gradient, block_factor, true);

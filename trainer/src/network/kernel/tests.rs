@@ -44,6 +44,7 @@ fn topology(vertex_count: usize) -> Topology {
         faces: Vec::new(),
         ring_offsets,
         ring,
+        piece_of: Vec::new(),
         bridges: Vec::new(),
         findings: TopologyFindings::default(),
     }
@@ -57,6 +58,7 @@ struct Case {
     modes: Vec<f32>,
     outside: Vec<Vec<bool>>,
     attention: Attention,
+    activation: Activation,
 }
 
 impl Case {
@@ -83,11 +85,16 @@ impl Case {
                 .map(|rows| (0..rows * vertex_count).map(|at| at % 3 != 0).collect())
                 .collect(),
             attention: Attention::Components,
+            activation: Activation::FromRest,
         }
     }
 
     fn sharing(self, attention: Attention) -> Self {
         Self { attention, ..self }
+    }
+
+    fn activated(self, activation: Activation) -> Self {
+        Self { activation, ..self }
     }
 
     fn kernel(&self) -> Kernel {
@@ -96,6 +103,7 @@ impl Case {
             &self.vertex_weights,
             &self.modes,
             self.attention,
+            self.activation,
         )
     }
 }
@@ -107,7 +115,7 @@ struct Naive {
     shapes: Vec<f64>,
 }
 
-fn naive_convolution(topology: &Topology, numbers: &[f64], x: &[f64]) -> Vec<f64> {
+fn naive_convolution(topology: &Topology, activation: Activation, numbers: &[f64], x: &[f64]) -> Vec<f64> {
     let mut y = vec![0.0; x.len()];
     for v in 0..topology.vertex_count {
         let ring = topology.ring_of(v);
@@ -120,7 +128,10 @@ fn naive_convolution(topology: &Topology, numbers: &[f64], x: &[f64]) -> Vec<f64
                 };
                 sum += numbers[o * 9 + i] * x[v * 9 + i] + numbers[81 + o * 9 + i] * mean;
             }
-            y[v * 9 + o] = sum.tanh() - numbers[162 + o].tanh();
+            y[v * 9 + o] = match activation {
+                Activation::FromRest => sum.tanh() - numbers[162 + o].tanh(),
+                Activation::Plain => sum.tanh(),
+            };
         }
     }
     y
@@ -157,12 +168,12 @@ fn naive(case: &Case, components: &[f64], convolutions: &[f64], settings: &LossS
             let mut residuals = Vec::new();
             let mut block_latents = Vec::new();
             for (x, e) in input.iter().zip(&mut error) {
-                let hidden = naive_convolution(topology, encoder, x);
+                let hidden = naive_convolution(topology, case.activation, encoder, x);
                 let z: Vec<f64> = (0..k_count)
                     .map(|k| (0..len).map(|at| c(k, at) * hidden[at]).sum())
                     .collect();
                 let blend: Vec<f64> = (0..len).map(|at| (0..k_count).map(|k| z[k] * c(k, at)).sum()).collect();
-                let y = naive_convolution(topology, decoder, &blend);
+                let y = naive_convolution(topology, case.activation, decoder, &blend);
                 residuals.push(x.iter().zip(&y).map(|(x, y)| x - y).collect::<Vec<_>>());
                 e.iter_mut().zip(&y).for_each(|(e, y)| *e -= y);
                 block_latents.extend(z);
@@ -225,6 +236,8 @@ fn doubles(numbers: &[f32]) -> Vec<f64> {
     numbers.iter().map(|&number| f64::from(number)).collect()
 }
 
+const ACTIVATIONS: [Activation; 2] = [Activation::FromRest, Activation::Plain];
+
 /// Components of each level, shapes, and how residuals are shared out.
 const CASES: [(&[usize], usize, Attention); 7] = [
     (&[3], 2, Attention::Components),
@@ -236,6 +249,12 @@ const CASES: [(&[usize], usize, Attention); 7] = [
     (&[2, 2, 2], 3, Attention::Equal),
     (&[9, 2], 11, Attention::Equal),
 ];
+
+fn every_case() -> impl Iterator<Item = ((&'static [usize], usize, Attention), Activation)> {
+    CASES
+        .into_iter()
+        .flat_map(|case| ACTIVATIONS.map(|activation| (case, activation)))
+}
 
 /// Every term at once, with a range that some latents leave.
 fn all_terms() -> LossSettings {
@@ -258,8 +277,10 @@ fn assert_close(found: f64, expected: f64, scale: f64, tolerance: f64, what: &st
 
 #[test]
 fn outputs_and_loss_equal_the_naive_model() {
-    for (counts, shape_count, attention) in CASES {
-        let case = Case::new(13, shape_count, counts).sharing(attention);
+    for ((counts, shape_count, attention), activation) in every_case() {
+        let case = Case::new(13, shape_count, counts)
+            .sharing(attention)
+            .activated(activation);
         let (components, convolutions) = (case.weights.flat_components(), case.weights.flat_convolutions());
         let expected = naive(&case, &doubles(&components), &doubles(&convolutions), &all_terms());
         let mut kernel = case.kernel();
@@ -329,6 +350,8 @@ fn gradients_of_all_terms_equal_differences() {
     }
     let equal = Case::new(11, 3, &[2, 2, 2]).sharing(Attention::Equal);
     check_gradients(&equal, &all_terms(), 7);
+    let plain = Case::new(11, 3, &[3, 2]).activated(Activation::Plain);
+    check_gradients(&plain, &all_terms(), 7);
 }
 
 #[test]
@@ -403,10 +426,12 @@ fn buffers_do_not_carry_over() {
 
 #[test]
 fn loss_and_every_gradient_equal_the_differentiable_model() {
-    for (counts, shape_count, attention) in CASES {
-        let case = Case::new(13, shape_count, counts).sharing(attention);
+    for ((counts, shape_count, attention), activation) in every_case() {
+        let case = Case::new(13, shape_count, counts)
+            .sharing(attention)
+            .activated(activation);
         let ring = RingMean::new(&case.topology);
-        let model = DifferentiableStack::new(&ring, &case.vertex_weights, &case.modes, attention);
+        let model = DifferentiableStack::new(&ring, &case.vertex_weights, &case.modes, attention, case.activation);
         for settings in [all_terms(), LossSettings::paper(), LossSettings::local()] {
             let (expected_terms, expected) = model.differentiate(&case.weights, &case.shapes, &case.outside, &settings);
             let (terms, found) = case

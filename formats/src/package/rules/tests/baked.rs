@@ -4,20 +4,16 @@ use super::*;
 
 #[test]
 fn permutation_rules() {
-    let (field, v) = ("lane_from_vertex", u64::from(V));
-    baked(|t| t.lane_from_vertex.truncate(8), counts(field, v, v - 1));
-    baked(|t| t.vertex_from_lane.push(0), counts("vertex_from_lane", v, v + 1));
-    baked(|t| t.lane_from_vertex[6] = V, beyond(field, 6, V, V));
-    baked(|t| t.lane_from_vertex[0] = 1, NotAPermutation { field, index: 0 });
-    baked(|t| t.vertex_from_lane.swap(0, 1), NotAPermutation { field, index: 4 });
-    let (field, index) = ("solver_from_lane", 0);
-    baked(|t| t.exact.solver_from_lane.truncate(8), counts(field, v, v - 1));
-    baked(
-        |t| t.exact.lane_from_solver.push(0),
-        counts("lane_from_solver", v, v + 1),
-    );
-    baked(|t| t.exact.solver_from_lane[3] = V, beyond(field, 3, V, V));
-    baked(|t| t.exact.solver_from_lane[0] = 1, NotAPermutation { field, index });
+    let (field, v) = ("slot_from_vertex", u64::from(V));
+    baked(|t| t.slot_from_vertex.truncate(8), counts(field, v, v - 1));
+    baked(|t| t.vertex_from_slot.push(0), counts("vertex_from_slot", v, v + 1));
+    baked(|t| t.slot_from_vertex[6] = V, beyond(field, 6, V, V));
+    baked(|t| t.slot_from_vertex[0] = 1, NotAPermutation { field, index: 0 });
+    baked(|t| t.vertex_from_slot.swap(0, 1), NotAPermutation { field, index: 4 });
+    let (field, index) = ("solver_from_slot", 1);
+    baked(|t| t.exact.solver_from_slot.truncate(8), counts(field, v, v - 1));
+    baked(|t| t.exact.solver_from_slot[3] = V, beyond(field, 3, V, V));
+    baked(|t| t.exact.solver_from_slot[1] = 8, NotAPermutation { field, index });
 }
 
 #[test]
@@ -150,96 +146,23 @@ fn factor_rules() {
 #[test]
 fn patch_rules() {
     let tiny = tiny_baked().exact;
-    let patch_count = tiny.patch_owners.len() as u64;
+    let patch_count = tiny.patches.owners.len() as u64;
     baked(|t| t.blocks[1].bias[4] = f32::NAN, not_finite("blocks.bias", 1));
     let field = "patch_offsets";
-    baked(|t| t.exact.patch_offsets.push(4), counts(field, 2, 3));
-    baked(|t| t.exact.patch_offsets[0] = 1, NotContiguous { field, index: 0 });
-    baked(|t| t.exact.patch_offsets[1] = 3, counts(field, patch_count, 3));
+    baked(|t| t.exact.patches.offsets.push(4), counts(field, 2, 3));
+    baked(|t| t.exact.patches.offsets[0] = 1, NotContiguous { field, index: 0 });
+    baked(|t| t.exact.patches.offsets[1] = 3, counts(field, patch_count, 3));
     let field = "patch_owners";
     baked(
-        |t| t.exact.patch_values.truncate(1),
+        |t| t.exact.patches.values.truncate(1),
         counts("patch_values", patch_count, 1),
     );
     let (unknown, limit) = (COMPONENT_COUNT as u16, COMPONENT_COUNT as u32);
-    baked(|t| t.exact.patch_owners[3][0] = unknown, beyond(field, 3, limit, limit));
-    baked(|t| t.exact.patch_owners[3][0] = 2, NotAscending { field, index: 3 });
-    baked(|t| t.exact.patch_owners.swap(0, 1), NotAscending { field, index: 1 });
-    baked(|t| t.exact.patch_owners[3][1] = 1, NotContiguous { field, index: 3 });
     baked(
-        |t| t.exact.patch_values[2][8][15] = HALF_NAN,
-        not_finite("patch_values", 2),
+        |t| t.exact.patches.owners[3][0] = unknown,
+        beyond(field, 3, limit, limit),
     );
-}
-
-fn fast(damage: impl Fn(&mut TinyFast), expected: OpenError) {
-    baked(
-        |t| {
-            let mut tier = t.own_nodes();
-            damage(&mut tier);
-            t.fast = Some(tier);
-        },
-        expected,
-    );
-}
-
-/// The same checks run on both tiers: one rule of each kind shows that they do.
-#[test]
-fn rules_of_the_fast_tiers_nodes() {
-    let field = "rest_positions";
-    fast(
-        |t| t.nodes.rest_positions.clear(),
-        TooFew {
-            field,
-            least: 1,
-            actual: 0,
-        },
-    );
-    let (limit, actual) = (V as usize, V as usize + 1);
-    fast(
-        |t| t.nodes.rest_positions.push([0.0; 3]),
-        TooMany { field, limit, actual },
-    );
-    fast(|t| t.nodes.rest_positions[2][1] = f32::NAN, not_finite(field, 2));
-    fast(|t| t.nodes.ring_weights[3] = f32::NAN, not_finite("ring_weights", 3));
-    fast(|t| t.nodes.tiles[1][0] = f32::NAN, not_finite("tiles", 1));
-    fast(|t| t.nodes.solver_from_lane[0] = V, beyond("solver_from_lane", 0, V, V));
-    fast(
-        |t| t.nodes.patch_values[3][0][7] = HALF_NAN,
-        not_finite("patch_values", 3),
-    );
-}
-
-#[test]
-fn skin_rules() {
-    let v = u64::from(V);
-    fast(|t| t.skin_nodes.truncate(8), counts("skin_nodes", v, v - 1));
-    fast(|t| t.skin_weights.push([0; 4]), counts("skin_weights", v, v + 1));
-    fast(|t| t.skin_nodes[5][3] = V as u16, beyond("skin_nodes", 5, V, V));
-    let sum = 65_534;
-    fast(|t| t.skin_weights[7][1] -= 1, SkinWeightSum { lane: 7, sum });
-    let sum = 4 * 65_535;
-    fast(|t| t.skin_weights[0] = [u16::MAX; 4], SkinWeightSum { lane: 0, sum });
-}
-
-#[test]
-fn the_fast_tiers_figures_are_finite_and_not_negative() {
-    fast(|t| t.centre[1] = f32::INFINITY, not_finite("fast.centre", 0));
-    fast(|t| t.error.mixed_rms = f32::NAN, not_finite("fast.error.mixed_rms", 0));
-    fast(
-        |t| t.error.single_max = f32::NAN,
-        not_finite("fast.error.single_max", 0),
-    );
-    let (least, greatest, value) = (0.0, limits::QUALITY, -1.0);
-    let negative = |field| OutOfRange {
-        field,
-        index: 0,
-        value,
-        least,
-        greatest,
-    };
-    fast(|t| t.error.mixed_p99 = value, negative("fast.error.mixed_p99"));
-    fast(|t| t.error.mixed_max = value, negative("fast.error.mixed_max"));
-    fast(|t| t.error.single_rms = value, negative("fast.error.single_rms"));
-    fast(|t| t.error.normal_rms = value, negative("fast.error.normal_rms"));
+    baked(|t| t.exact.patches.owners[3][0] = 2, NotAscending { field, index: 3 });
+    baked(|t| t.exact.patches.owners.swap(0, 1), NotAscending { field, index: 1 });
+    baked(|t| t.exact.patches.owners[3][1] = 1, NotContiguous { field, index: 3 });
 }

@@ -1,20 +1,20 @@
 //! Each rule broken once on the tiny package, and the error that names it.
 
+mod added;
 mod baked;
+mod bones;
 mod compact;
-mod render;
+mod surface;
 
 use alloc::string::String;
 
 use super::super::fixture::{
-    COMPONENT_COUNT, TinyBaked, TinyCompact, TinyFast, TinyRender, VERTEX_COUNT, tiny_baked, tiny_compact,
+    COMPONENT_COUNT, TinyBaked, TinyBones, TinyCompact, TinySurface, VERTEX_COUNT, tiny_baked, tiny_compact,
 };
 use super::super::*;
 use OpenError::*;
 
 const V: u32 = VERTEX_COUNT as u32;
-const HALF_INFINITY: u16 = 0x7c00;
-const HALF_NAN: u16 = 0xfe01;
 
 fn compact(damage: impl Fn(&mut TinyCompact), expected: OpenError) {
     let mut tiny = tiny_compact();
@@ -53,7 +53,7 @@ fn counts(field: &'static str, expected: u64, actual: u64) -> OpenError {
 fn mesh_rules() {
     let field = "rest_positions";
     compact(|t| t.rest_positions[4][2] = f32::NAN, not_finite(field, 4));
-    baked(|t| t.exact.rest_positions[8][0] = f32::INFINITY, not_finite(field, 8));
+    baked(|t| t.rest_positions[8][0] = f32::INFINITY, not_finite(field, 8));
     let far = 2.0 * limits::POSITION;
     let (least, greatest) = (-limits::POSITION, limits::POSITION);
     compact(
@@ -74,16 +74,6 @@ fn mesh_rules() {
             actual: 2,
         },
     );
-    compact(
-        |t| t.faces.clear(),
-        TooFew {
-            field: "faces",
-            least: 1,
-            actual: 0,
-        },
-    );
-    compact(|t| t.faces[7][2] = V, beyond("faces", 7, V, V));
-    baked(|t| t.faces[0][0] = u32::MAX, beyond("faces", 0, u32::MAX, V));
     compact(|t| t.anchor_vertex = V, beyond("anchor_vertex", 0, V, V));
     compact(|t| t.bridges[0][1] = V, beyond("bridges", 0, V, V));
     compact(
@@ -240,15 +230,15 @@ fn component_rules() {
     compact(|t| t.components[0].minimum = 0.5, RangeWithoutZero { component: 0 });
     baked(|t| t.components[0].maximum = -0.5, RangeWithoutZero { component: 0 });
     compact(
-        |t| t.components[0].value_scale = 0.0,
+        |t| t.components[0].value_scales.rotation = 0.0,
         NotPositive {
-            field: "components.value_scale",
+            field: "components.value_scales",
             index: 0,
         },
     );
     baked(
-        |t| t.components[3].value_scale = f32::NAN,
-        not_finite("components.value_scale", 3),
+        |t| t.components[3].value_scales.stretch = f32::NAN,
+        not_finite("components.value_scales", 3),
     );
 }
 

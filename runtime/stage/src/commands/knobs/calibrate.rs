@@ -6,9 +6,8 @@ use std::path::PathBuf;
 use clap::Args;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use miette::miette;
-use sinew_runtime::input::{
-    CalibrationRefusal, CalibrationSettings, Calibrator, DeviceStatus, KnobProgress, KnobTrial, Progress,
-};
+use sinew_knobs::calibrate::{CalibrationRefusal, CalibrationSettings, Calibrator, KnobProgress, KnobTrial, Progress};
+use sinew_knobs::device::DeviceStatus;
 
 use super::{Listener, knob_words};
 use crate::calibration::{CalibratedKnob, Calibrations, DeviceCalibration, default_path};
@@ -92,7 +91,6 @@ pub fn run(arguments: &CalibrateArguments, quiet: bool) -> Result<(), Failure> {
         .into());
     }
     let before = calibrations.of(&device).cloned().unwrap_or_default();
-    let follow_supply = calibrator.lowest_supply() < 0.98;
     let count = measured.len();
     let mut knobs = measured;
     let kept = before
@@ -104,14 +102,10 @@ pub fn run(arguments: &CalibrateArguments, quiet: bool) -> Result<(), Failure> {
     knobs.sort_by_key(|knob| knob.address);
     let calibration = DeviceCalibration {
         device: device.clone(),
-        follow_supply,
         knobs,
     };
     calibrations.store(&path, calibration)?;
     if !quiet {
-        if follow_supply {
-            eprintln!("the supply sagged meanwhile: readings will be corrected for it");
-        }
         eprintln!(
             "{} of {device} measured; written to {}",
             crate::count::count(count as u64, "knob"),

@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use sinew_formats::package::save_package;
+use sinew_knobs::Protocol;
+use sinew_knobs::device::DeviceStatus;
 use sinew_runtime::Basis;
-use sinew_runtime::input::{DeviceStatus, Protocol};
 
 use super::{Listener, knob_words, protocol};
 use crate::calibration::quoted;

@@ -12,7 +12,7 @@ pub fn run() -> Result<(), Failure> {
 
 #[cfg(feature = "serial")]
 fn serial() -> Result<(), Failure> {
-    let ports = sinew_runtime::input::serial_ports().map_err(|error| miette::miette!("{error}"))?;
+    let ports = sinew_knobs::device::serial_ports().map_err(|error| miette::miette!("{error}"))?;
     if ports.is_empty() {
         println!("serial ports: none; is the box plugged in, and does its cable carry data?");
         return Ok(());
@@ -32,7 +32,7 @@ fn serial() -> Result<(), Failure> {
 
 #[cfg(feature = "midi")]
 fn midi() {
-    match sinew_runtime::input::midi_ports() {
+    match sinew_knobs::device::midi_ports() {
         Ok(names) if names.is_empty() => println!("MIDI ports: none"),
         Ok(names) => {
             println!("MIDI ports, for --midi (a part of the name is enough):");

@@ -14,7 +14,8 @@ use std::thread;
 
 use clap::Subcommand;
 use miette::Report;
-use sinew_runtime::input::{Clock, DeviceStatus, KnobEvent, Protocol, SourceEvent};
+use sinew_knobs::device::{Clock, DeviceStatus};
+use sinew_knobs::{KnobEvent, Protocol, SourceEvent};
 
 use super::{Failure, interrupted};
 use crate::config::{DeviceChoice, midi_words};
@@ -111,7 +112,7 @@ fn knob_words(status: &DeviceStatus, knob: u16) -> String {
 }
 
 fn protocol(status: &DeviceStatus) -> Option<Protocol> {
-    use sinew_runtime::input::protocol::Recognition;
+    use sinew_knobs::protocol::Recognition;
     match status.recognition {
         Recognition::Named(protocol) => Some(protocol),
         Recognition::Found(finding) => Some(finding.protocol),

@@ -5,7 +5,8 @@ use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 
 use clap::Args;
-use sinew_runtime::input::{DeviceStatus, Reading};
+use sinew_knobs::Reading;
+use sinew_knobs::device::DeviceStatus;
 
 use super::{Listener, knob_words};
 use crate::commands::{Failure, catch_interrupts, interrupted, parse_duration, read_choice};

@@ -3,24 +3,32 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use crossbeam::channel::unbounded;
+use crossbeam::channel::bounded;
 use miette::{IntoDiagnostic, WrapErr, miette};
+use sinew_formats::package::AlignedBytes;
+use sinew_knobs::device::Clock;
+use sinew_knobs::take::Take;
+use sinew_knobs::{ControlMap, SurfaceLayout};
 use sinew_runtime::Basis;
-use sinew_runtime::input::{Clock, ControlMap, SurfaceLayout};
-use sinew_runtime::take::Take;
 
-use super::{PlayArguments, Watcher, draws, finish_streams, say, start_streams, title};
+use super::{PlayArguments, Watcher, draws, finish_streams, say, start_page, start_streams, title};
 use crate::commands::{Failure, catch_interrupts};
 use crate::count::count;
 use crate::export::WeightsTable;
 use crate::play::{Replay, Scene, SceneMemory, TakeParts};
-use crate::snapshot::{Board, Labels};
+use crate::snapshot::{Board, Labels, REQUESTS_MAX};
 
 /// More frames than a take can be meant to have: two days at sixty a second.
 const FRAMES_MAX: f64 = 1e7;
 
 /// Runs it.
-pub fn run(arguments: &PlayArguments, basis: &Basis<'_>, path: &Path, quiet: bool) -> Result<(), Failure> {
+pub fn run(
+    arguments: &PlayArguments,
+    package: &Arc<AlignedBytes>,
+    basis: &Basis<'_>,
+    path: &Path,
+    quiet: bool,
+) -> Result<(), Failure> {
     let bytes = std::fs::read(path)
         .into_diagnostic()
         .wrap_err_with(|| format!("cannot read {}", path.display()))?;
@@ -47,7 +55,11 @@ pub fn run(arguments: &PlayArguments, basis: &Basis<'_>, path: &Path, quiet: boo
     let streams = start_streams(arguments, basis)?;
     let tree = take.tree().map(|tree| (tree.coarse_knobs, tree.fine_knobs));
     let labels = Labels::new(
-        format!("{}, take {}", title(&arguments.package, basis), path.display()),
+        format!(
+            "{}, take {}",
+            title(arguments.package.as_deref(), basis),
+            path.display()
+        ),
         basis,
         &parts.knobs,
         map.page_count(),
@@ -58,13 +70,14 @@ pub fn run(arguments: &PlayArguments, basis: &Basis<'_>, path: &Path, quiet: boo
         SurfaceLayout::for_map(&map).slot_count,
         basis.component_count(),
     ));
-    let (ask, requests) = unbounded();
+    let (ask, requests) = bounded(REQUESTS_MAX);
     let watched = draws(arguments);
+    let page = start_page(arguments, package, &board, &labels, &ask)?;
     let watcher = Watcher::start(arguments, &board, labels, &ask, quiet || !watched)?;
     let mut replay = Replay {
         clock: Clock::start(),
         // Files take every frame as fast as they can; whoever watches or listens wants to see them in time.
-        paced: watched || arguments.streams.iter().any(|spec| !spec.is_file()),
+        paced: watched || page.is_some() || arguments.streams.iter().any(|spec| !spec.is_file()),
         fps: arguments.fps,
         requests,
         streams,
@@ -74,6 +87,9 @@ pub fn run(arguments: &PlayArguments, basis: &Basis<'_>, path: &Path, quiet: boo
     };
     let outcome = replay.run(&take, &map, &mut scene);
     watcher.end(&board);
+    if let Some(page) = page {
+        say(quiet, &page.finish().to_string());
+    }
     let outcome = outcome?;
     let cut = if outcome.cut { ", not to its end" } else { "" };
     say(quiet, &format!("replayed {}{cut}", outcome.checksum));

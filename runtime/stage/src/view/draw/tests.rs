@@ -2,10 +2,9 @@
 
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
-use sinew_runtime::input::protocol::Recognition;
-use sinew_runtime::input::{
-    Assignment, Counters, DeviceStatus, Direction, Fault, Health, Link, Protocol, SourceStatus, SurfaceStatus, TreeView,
-};
+use sinew_knobs::device::{DeviceStatus, Link};
+use sinew_knobs::protocol::Recognition;
+use sinew_knobs::{Assignment, Counters, Direction, Fault, Health, Protocol, SurfaceStatus, TreeView};
 
 use super::*;
 use crate::snapshot::{ComponentLabel, Recording};
@@ -26,17 +25,19 @@ fn labels() -> Labels {
 }
 
 fn snapshot() -> Snapshot {
-    let assignment = |knob, control, state| Assignment { knob, control, state };
+    let assignment = |knob, control, state| Assignment {
+        knob,
+        control,
+        state,
+        knob_weight: None,
+    };
     let waiting = TakeoverState::Waiting {
         direction: Direction::Left,
         distance: 0.34,
     };
     let device = DeviceStatus {
-        counts: SourceStatus::default(),
         link: Link::Open,
-        port: "/dev/ttyACM0".to_owned(),
         baud: Some(9600),
-        recognition: Recognition::Named(Protocol::Lines),
         confidence: 100,
         counters: Counters {
             good: 988,
@@ -44,11 +45,7 @@ fn snapshot() -> Snapshot {
             last_fault: Some(Fault::NotNumbers),
             ..Counters::default()
         },
-        merged: 0,
-        waiting: 0,
-        firmware: None,
-        names: Vec::new(),
-        last_error: None,
+        ..DeviceStatus::new("/dev/ttyACM0".to_owned(), Recognition::Named(Protocol::Lines))
     };
     Snapshot {
         now_us: 2_000_000,
@@ -69,7 +66,6 @@ fn snapshot() -> Snapshot {
                 lost: true,
                 ..Health::default()
             },
-            supply: 1.0,
             ..SurfaceStatus::default()
         },
         device: Some(device),
