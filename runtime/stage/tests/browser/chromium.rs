@@ -79,7 +79,7 @@ impl Chromium {
         let target = read_json(&mut stream);
         let (socket, _) = tungstenite::connect(target["webSocketDebuggerUrl"].as_str().unwrap()).unwrap();
         if let MaybeTlsStream::Plain(stream) = socket.get_ref() {
-            stream.set_read_timeout(Some(Duration::from_secs(30))).unwrap();
+            stream.set_read_timeout(Some(Duration::from_secs(120))).unwrap();
         }
         let mut tab = Tab { socket, calls: 0 };
         let mobile = width < 500;
@@ -96,7 +96,7 @@ impl Chromium {
 
 /// The body of an answer, which the browser sends without closing the connection.
 fn read_json(stream: &mut TcpStream) -> Value {
-    stream.set_read_timeout(Some(Duration::from_secs(30))).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(120))).unwrap();
     let (mut answer, mut buffer) = (Vec::new(), [0; 4096]);
     loop {
         let read = stream.read(&mut buffer).unwrap();
@@ -172,8 +172,18 @@ impl Tab {
         );
     }
 
+    /// Waits until the page has drawn what it knows: a page behind another one may be many pictures late.
+    fn settle(&mut self) {
+        self.bring_forward();
+        let two_pictures =
+            "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))";
+        let parameters = json!({ "expression": two_pictures, "awaitPromise": true });
+        self.call("Runtime.evaluate", parameters);
+    }
+
     /// A point of the window where the mesh can be taken hold of: the seen vertex that is highest.
     pub fn mesh_point(&mut self) -> (f64, f64) {
+        self.settle();
         let found = self.evaluate(
             "(() => { const all = Array.from({ length: sinew.vertexCount }, (_, v) => view.screenOf(sinew.positions, v)); \
              const seen = all.filter(([x, y], v) => view.vertexAt(sinew.positions, sinew.normals, x, y, 2)?.vertex === v); \
@@ -182,12 +192,13 @@ impl Tab {
         (found[0].as_f64().unwrap(), found[1].as_f64().unwrap())
     }
 
-    /// Drags with the main button.
+    /// Drags with the main button, as slowly as the page draws.
     pub fn drag(&mut self, from: (f64, f64), to: (f64, f64)) {
-        self.bring_forward();
+        self.settle();
         let mut mouse = |kind: &str, (x, y): (f64, f64), buttons: u32| {
             let event = json!({ "type": kind, "x": x, "y": y, "button": "left", "buttons": buttons, "clickCount": 1 });
             self.call("Input.dispatchMouseEvent", event);
+            self.settle();
         };
         mouse("mousePressed", from, 1);
         for step in 1..=8 {

@@ -15,7 +15,7 @@ use common::Stage;
 
 /// Asks a page until the answer is true.
 fn wait_for(tab: &mut Tab, condition: &str) {
-    let until = Instant::now() + Duration::from_secs(20);
+    let until = Instant::now() + Duration::from_secs(40);
     while Instant::now() < until {
         if tab.evaluate(condition) == serde_json::Value::Bool(true) {
             return;
@@ -80,6 +80,7 @@ fn hands_on_one_page_move_the_picture_of_another() {
     // Undo on the desk knows only the desk's hands; rest takes all of them back.
     desk.evaluate("element('reset').click()");
     wait_for(&mut phone, "tree.rows.every(({ weight }) => weight === 0)");
+    wait_for(&mut desk, "tree.rows.every(({ weight }) => weight === 0)");
 
     // A hand on the mesh.
     let (x, y) = desk.mesh_point();
