@@ -35,6 +35,7 @@ mod open;
 mod order;
 mod pc2;
 mod ply;
+mod puppet;
 mod read;
 mod rig;
 mod scene;
@@ -58,6 +59,7 @@ pub use npy::{NpyArray, write_npy_f32, write_npy_matrix, write_npy_u32, write_np
 pub use obj::{write_obj, write_sequence_obj};
 pub use open::{OpenSequence, read_contents};
 pub use ply::write_ply;
+pub use puppet::{JointPose, Keys, Puppet, PuppetClip, Track, skinned, write_puppet};
 pub use read::{SequenceRead, read_sequence};
 pub use scene::{ClipEntry, Contents, MeshEntry, Motion, Space, UpAxis};
 pub use sequence::{MeshSequence, RenderSurface};

@@ -1,5 +1,6 @@
 //! Joints and their hold on vertices, carried from file to file beside the shapes they made.
 
+use glam::{DAffine3, DMat3, DVec3};
 use std::collections::HashMap;
 
 /// Joints of a skin at rest and their hold on vertices.
@@ -22,6 +23,14 @@ pub struct Joint {
     pub parent: Option<u32>,
     /// From joint to mesh in the bind pose: the images of the three axes, and the origin.
     pub bind: [[f64; 3]; 4],
+}
+
+impl Joint {
+    /// [`Joint::bind`] as a map.
+    pub(super) fn bind_map(&self) -> DAffine3 {
+        let [x, y, z, origin] = self.bind.map(DVec3::from);
+        DAffine3::from_mat3_translation(DMat3::from_cols(x, y, z), origin)
+    }
 }
 
 impl Skin {

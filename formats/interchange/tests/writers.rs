@@ -3,7 +3,10 @@
 mod common;
 
 use common::{bits, read, tent};
-use sinew_interchange::{Choice, MeshSequence, OutputSurface, UpAxis, WriteError, create_writer, write_sequence};
+use sinew_interchange::{
+    Choice, Dress, Joint, JointPose, MeshSequence, OutputSurface, Puppet, PuppetClip, Skin, UpAxis, WriteError,
+    create_writer, skinned, write_puppet, write_sequence,
+};
 use std::fs;
 
 /// The texture coordinates of all corners of all triangles.
@@ -184,4 +187,91 @@ fn a_gltf_file_plays_what_was_written() {
             assert!(apart <= 2e-7, "{name}: {apart}");
         }
     }
+}
+
+#[test]
+fn a_puppet_plays_as_its_joints_say() {
+    let tent = tent();
+    let folder = tempfile::tempdir().unwrap();
+    let rest = &tent.shapes[0];
+    let at = |x: f32, angle: f32, scale: f32| JointPose {
+        translation: [x, 0.5 * x, -x],
+        rotation: [0.0, (0.5 * angle).sin(), 0.0, (0.5 * angle).cos()],
+        scale: [scale, 1.0, 1.0 / scale],
+    };
+    let joints = [at(0.25, 0.75, 1.0), at(-1.0, 0.0, 1.0)];
+    let mut skin = Skin {
+        joints: (joints.iter().enumerate())
+            .map(|(j, pose)| Joint {
+                name: format!("joint{j}"),
+                parent: None,
+                bind: pose.bind(),
+            })
+            .collect(),
+        ..Skin::default()
+    };
+    for v in 0..rest.len() {
+        skin.influences.extend([(0, v as f32), (1, 1.0)]);
+        skin.end_vertex();
+    }
+    let dress = Dress {
+        skin: Some(skin),
+        ..tent.dress.clone()
+    };
+    let poses: Vec<Vec<JointPose>> = (0..9)
+        .map(|n| {
+            let t = n as f32;
+            vec![at(0.25 * t, 0.75 + t, 1.0 + 0.1 * t), joints[1]]
+        })
+        .collect();
+    let clip = PuppetClip::of_poses("swing", 24.0, &joints, &poses, &[4.0, 4.0], 1e-6);
+    assert!(clip.tracks.iter().all(|track| track.joint == 0), "the other one rests");
+    let raised: Vec<[f32; 3]> = rest.iter().map(|&[x, y, z]| [x, y + 1.0, z]).collect();
+    let lifted = PuppetClip {
+        weights: vec![vec![0.0], vec![-2.0], vec![0.5]],
+        tracks: Vec::new(),
+        frame_count: 3,
+        name: "lift".into(),
+        ..clip.clone()
+    };
+    let puppet = Puppet {
+        surface: OutputSurface {
+            dress: &dress,
+            unit_metres: Some(0.5),
+            up: Some(UpAxis::Y),
+            ..OutputSurface::of_sequence(&tent)
+        },
+        rest,
+        targets: vec![("raised".into(), raised)],
+        clips: vec![clip.clone(), lifted],
+        extras: serde_json::json!({ "of": "a test" }),
+    };
+    for name in ["a.glb", "a.gltf"] {
+        let path = folder.path().join(name);
+        write_puppet(&path, &puppet).unwrap();
+        let of_clip = |clip: &str| {
+            let choice = Choice {
+                clip: Some(clip.into()),
+                ..Choice::default()
+            };
+            read(&path, &choice).unwrap_or_else(|error| panic!("{error}")).sequence
+        };
+        let played = of_clip("swing");
+        assert_eq!(played.shape_count(), poses.len());
+        for (n, shape) in played.shapes.iter().enumerate() {
+            let wanted = skinned(&dress, rest, &clip.pose(n, &joints));
+            for (found, wanted) in shape.iter().zip(&wanted) {
+                let far = (0..3).map(|c| (found[c] - 0.5 * wanted[c]).abs()).fold(0.0, f32::max);
+                assert!(far < 1e-5, "{name}, frame {n}: {found:?}, {wanted:?}");
+            }
+        }
+        let lifted = of_clip("lift");
+        for (found, rest) in lifted.shapes[1].iter().zip(rest) {
+            assert!((found[1] - 0.5 * (rest[1] - 2.0)).abs() < 1e-5, "{found:?}, {rest:?}");
+        }
+    }
+    assert!(matches!(
+        write_puppet(&folder.path().join("a.abc"), &puppet),
+        Err(WriteError::NotGltf { .. })
+    ));
 }

@@ -53,6 +53,8 @@ enum Command {
     Rename(commands::rename::RenameArguments),
     /// Write one pose as a mesh
     Frame(commands::frame::FrameArguments),
+    /// Write bones, clips and sliders as glTF, for engines
+    Export(commands::export::ExportArguments),
     /// Write a sequence in another program's format
     Convert(commands::convert::ConvertArguments),
     /// Prepare a compact package for the frame path of an engine
@@ -73,6 +75,7 @@ fn main() -> ExitCode {
         Command::Inspect(arguments) => commands::inspect::run(&arguments),
         Command::Rename(arguments) => commands::rename::run(&arguments, &console),
         Command::Frame(arguments) => commands::frame::run(&arguments, &console),
+        Command::Export(arguments) => commands::export::run(&arguments, &console),
         Command::Convert(arguments) => commands::convert::run(&arguments, &console),
         Command::Bake(arguments) => commands::bake::run(&arguments, &console),
         Command::Synthesize(arguments) => commands::synthesize::run(&arguments, &console),

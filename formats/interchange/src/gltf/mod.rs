@@ -6,10 +6,14 @@
 
 mod accessor;
 mod animation;
+mod arrays;
 mod document;
 mod meshopt;
 mod primitive;
+mod puppet;
 mod write;
+
+pub(crate) use puppet::write_puppet;
 
 use super::choose::Choice;
 use super::error::SequenceError;

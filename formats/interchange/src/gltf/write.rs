@@ -1,127 +1,25 @@
 //! Writes a glTF file that plays a sequence: the first frame is the mesh, every other one a morph target, and an animation shows one
 //! after the other.
 
+use super::arrays::{ARRAY, Arrays, Drawn, ELEMENTS, FLOAT, U8, U16, U32};
 use crate::mesh::Dress;
 use crate::scene::UpAxis;
-use crate::skin::Skin;
+use crate::skin::{Joint, Skin};
 use crate::write::{FrameWriter, Output, OutputSurface, WriteError, check_length};
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-const FLOAT: u32 = 5126;
-const U8: u32 = 5121;
-const U16: u32 = 5123;
-const U32: u32 = 5125;
-/// What viewers bind vertices and indices to.
-const ARRAY: u32 = 34962;
-const ELEMENTS: u32 = 34963;
 /// Influences of a set.
 const SET: usize = 4;
-
-/// Arrays as they are written, and what the JSON says of them.
-struct Arrays {
-    out: Output,
-    views: Vec<Value>,
-    accessors: Vec<Value>,
-}
-
-impl Arrays {
-    /// Adds an array; gives its number.
-    fn add(
-        &mut self,
-        bytes: &[u8],
-        component: u32,
-        kind: &str,
-        count: usize,
-        more: Value,
-    ) -> Result<usize, WriteError> {
-        let at = self.out.length();
-        self.out.put(bytes)?;
-        // Every array begins at a multiple of four bytes.
-        let padding = bytes.len().next_multiple_of(4) - bytes.len();
-        self.out.put(&[0; 4][..padding])?;
-        let mut view = json!({ "buffer": 0, "byteOffset": at, "byteLength": bytes.len() });
-        let mut accessor = json!({
-            "bufferView": self.views.len(), "componentType": component, "type": kind, "count": count,
-        });
-        if let (Some(view), Some(accessor), Value::Object(more)) =
-            (view.as_object_mut(), accessor.as_object_mut(), more)
-        {
-            for (key, value) in more {
-                if key == "target" {
-                    view.insert(key, value)
-                } else {
-                    accessor.insert(key, value)
-                };
-            }
-        }
-        self.views.push(view);
-        self.accessors.push(accessor);
-        Ok(self.accessors.len() - 1)
-    }
-
-    /// Adds vectors of vertices, with the range that the specification wants of positions.
-    fn vectors(&mut self, vectors: &[[f32; 3]], with_range: bool) -> Result<usize, WriteError> {
-        let bytes: Vec<u8> = vectors.as_flattened().iter().flat_map(|x| x.to_le_bytes()).collect();
-        let edge = |pick: fn(f32, f32) -> f32, start: f32| -> Vec<f32> {
-            (0..3).map(|c| vectors.iter().map(|p| p[c]).fold(start, pick)).collect()
-        };
-        let more = if with_range && !vectors.is_empty() {
-            json!({ "target": ARRAY, "min": edge(f32::min, f32::MAX), "max": edge(f32::max, f32::MIN) })
-        } else {
-            json!({ "target": ARRAY })
-        };
-        self.add(&bytes, FLOAT, "VEC3", vectors.len(), more)
-    }
-}
-
-/// What is drawn: render vertices, the first of each vertex in the order of the vertices, then the others. So those who weld seams again
-/// find the vertices in their order.
-struct Drawn {
-    /// The vertex that each stands for.
-    split: Vec<u32>,
-    faces: Vec<[u32; 3]>,
-    /// None where all are alike: then they only keep seams of normals.
-    uvs: Option<Vec<[f32; 2]>>,
-}
-
-impl Drawn {
-    fn of(surface: &OutputSurface<'_>) -> Drawn {
-        let mut drawn = Drawn {
-            split: (0..surface.vertex_count as u32).collect(),
-            faces: surface.faces.to_vec(),
-            uvs: None,
-        };
-        let Some(render) = surface.render else { return drawn };
-        let mut uvs = vec![[0.0; 2]; drawn.split.len()];
-        let mut is_taken = vec![false; drawn.split.len()];
-        let mut places = Vec::with_capacity(render.vertices.len());
-        for (&v, &uv) in render.vertices.iter().zip(&render.uvs) {
-            if core::mem::replace(&mut is_taken[v as usize], true) {
-                places.push(drawn.split.len() as u32);
-                drawn.split.push(v);
-                uvs.push(uv);
-            } else {
-                places.push(v);
-                uvs[v as usize] = uv;
-            }
-        }
-        drawn.faces = render
-            .faces
-            .iter()
-            .map(|face| face.map(|r| places[r as usize]))
-            .collect();
-        drawn.uvs = render.uvs.iter().any(|uv| *uv != render.uvs[0]).then_some(uvs);
-        drawn
-    }
-}
+/// The node of the mesh; the one before it is the root, those behind it are the joints, in their order.
+pub(super) const MESH_NODE: usize = 1;
 
 /// Writes frames as morph targets while they come.
-struct GltfWriter {
+pub(super) struct GltfWriter {
     path: PathBuf,
     is_binary: bool,
-    arrays: Arrays,
+    pub(super) arrays: Arrays,
     name: String,
     fps: f64,
     /// Turns and scales to metres with y up.
@@ -138,34 +36,55 @@ struct GltfWriter {
 }
 
 pub(super) fn open(path: &Path, surface: &OutputSurface<'_>) -> Result<Box<dyn FrameWriter>, WriteError> {
-    let turn = match surface.up {
-        Some(UpAxis::Z) => DQuat::from_rotation_x(-core::f64::consts::FRAC_PI_2),
-        Some(UpAxis::X) => DQuat::from_rotation_z(core::f64::consts::FRAC_PI_2),
-        Some(UpAxis::Y) | None => DQuat::IDENTITY,
-    };
-    let scale = DVec3::splat(surface.unit_metres.unwrap_or(1.0));
-    let drawn = Drawn::of(surface);
-    Ok(Box::new(GltfWriter {
-        path: path.into(),
-        is_binary: path
-            .extension()
-            .is_some_and(|extension| extension.eq_ignore_ascii_case("glb")),
-        arrays: Arrays {
-            out: Output::create(path)?,
-            views: Vec::new(),
-            accessors: Vec::new(),
-        },
-        name: surface.name.into(),
-        fps: surface.fps,
-        to_metres: DAffine3::from_scale_rotation_translation(scale, turn, DVec3::ZERO),
-        vertex_count: surface.vertex_count,
-        faces: surface.faces.to_vec(),
-        drawn,
-        dress: surface.dress.clone(),
-        base: None,
-        attributes: json!({}),
-        targets: Vec::new(),
-    }))
+    Ok(Box::new(GltfWriter::create(path, surface)?))
+}
+
+impl GltfWriter {
+    pub(super) fn create(path: &Path, surface: &OutputSurface<'_>) -> Result<GltfWriter, WriteError> {
+        let turn = match surface.up {
+            Some(UpAxis::Z) => DQuat::from_rotation_x(-core::f64::consts::FRAC_PI_2),
+            Some(UpAxis::X) => DQuat::from_rotation_z(core::f64::consts::FRAC_PI_2),
+            Some(UpAxis::Y) | None => DQuat::IDENTITY,
+        };
+        let scale = DVec3::splat(surface.unit_metres.unwrap_or(1.0));
+        let drawn = Drawn::of(surface);
+        Ok(GltfWriter {
+            path: path.into(),
+            is_binary: path
+                .extension()
+                .is_some_and(|extension| extension.eq_ignore_ascii_case("glb")),
+            arrays: Arrays {
+                out: Output::create(path)?,
+                views: Vec::new(),
+                accessors: Vec::new(),
+            },
+            name: surface.name.into(),
+            fps: surface.fps,
+            to_metres: DAffine3::from_scale_rotation_translation(scale, turn, DVec3::ZERO),
+            vertex_count: surface.vertex_count,
+            faces: surface.faces.to_vec(),
+            drawn,
+            dress: surface.dress.clone(),
+            base: None,
+            attributes: json!({}),
+            targets: Vec::new(),
+        })
+    }
+}
+
+/// A node that stands where a matrix says: as translation, rotation and scale, which can be animated, where those are all of it.
+fn placed(local: &DMat4) -> Value {
+    let (scale, rotation, translation) = local.to_scale_rotation_translation();
+    let same = DMat4::from_scale_rotation_translation(scale, rotation, translation);
+    if !same.abs_diff_eq(*local, 1e-9 * (1.0 + translation.length())) {
+        return json!({ "matrix": local.to_cols_array() });
+    }
+    let mut node = json!({ "translation": translation.to_array(), "rotation": rotation.to_array() });
+    // A rotation's matrix gives lengths to the last digit but one.
+    if !scale.abs_diff_eq(DVec3::ONE, 1e-6) {
+        node["scale"] = json!(scale.to_array());
+    }
+    node
 }
 
 /// Smooth normals: of the faces around each vertex, weighed by their areas.
@@ -212,32 +131,57 @@ impl FrameWriter for GltfWriter {
         Ok(())
     }
 
-    fn finish(mut self: Box<Self>) -> Result<(), WriteError> {
+    fn finish(self: Box<Self>) -> Result<(), WriteError> {
+        let names = (1..=self.targets.len()).map(|frame| format!("frame {frame}")).collect();
+        let play = |writer: &mut GltfWriter| match writer.targets.len() {
+            0 => Ok(Vec::new()),
+            _ => Ok(vec![writer.animation()?]),
+        };
+        self.close(names, play, Value::Null)
+    }
+}
+
+impl GltfWriter {
+    /// Writes what stands behind the frames and gives the file its name. `names` are those of the targets, `animations` what plays,
+    /// `extras` what the root node carries for other programs, or null.
+    pub(super) fn close(
+        mut self,
+        names: Vec<String>,
+        animations: impl FnOnce(&mut GltfWriter) -> Result<Vec<Value>, WriteError>,
+        extras: Value,
+    ) -> Result<(), WriteError> {
         self.attributes()?;
         let (primitives, materials) = self.primitives()?;
         let mut mesh = json!({ "name": self.name, "primitives": primitives });
         let (scale, rotation, _) = self.to_metres.to_scale_rotation_translation();
-        let mut root = json!({ "name": self.name, "children": [1] });
+        let mut root = json!({ "name": self.name, "children": [MESH_NODE] });
         if scale != DVec3::ONE {
             root["scale"] = json!(scale.to_array());
         }
         if rotation != DQuat::IDENTITY {
             root["rotation"] = json!(rotation.to_array());
         }
+        if !extras.is_null() {
+            root["extras"] = extras;
+        }
         let mut document = json!({
             "asset": { "version": "2.0", "generator": format!("Sinew {}", env!("CARGO_PKG_VERSION")) },
             "scene": 0, "scenes": [{ "nodes": [0] }],
         });
         if !self.targets.is_empty() {
-            let names: Vec<String> = (1..=self.targets.len()).map(|frame| format!("frame {frame}")).collect();
             mesh["weights"] = json!(vec![0; self.targets.len()]);
             mesh["extras"] = json!({ "targetNames": names });
-            document["animations"] = json!([self.animation()?]);
+        }
+        let animations = animations(&mut self)?;
+        if !animations.is_empty() {
+            document["animations"] = json!(animations);
         }
         let mut nodes = vec![root, json!({ "name": format!("{} mesh", self.name), "mesh": 0 })];
         if let Some(skin) = self.dress.skin.take().filter(|skin| !skin.joints.is_empty()) {
             document["skins"] = json!([self.skin(&skin, &mut nodes)?]);
-            nodes[1]["skin"] = json!(0);
+            nodes[MESH_NODE]["skin"] = json!(0);
+            // What joints move stands where they say: nothing above it counts, so nothing is.
+            document["scenes"] = json!([{ "nodes": [0, MESH_NODE] }]);
         }
         document["nodes"] = json!(nodes);
         document["meshes"] = json!([mesh]);
@@ -246,9 +190,7 @@ impl FrameWriter for GltfWriter {
         }
         self.write(document)
     }
-}
 
-impl GltfWriter {
     /// Adds what vertices have besides positions and normals.
     fn attributes(&mut self) -> Result<(), WriteError> {
         let count = self.drawn.split.len();
@@ -332,9 +274,7 @@ impl GltfWriter {
         let times: Vec<f32> = (0..=target_count)
             .map(|frame| (frame as f64 / self.fps) as f32)
             .collect();
-        let bytes: Vec<u8> = times.iter().flat_map(|time| time.to_le_bytes()).collect();
-        let range = json!({ "min": [0.0], "max": [times[target_count]] });
-        let input = self.arrays.add(&bytes, FLOAT, "SCALAR", times.len(), range)?;
+        let input = self.arrays.times(&times)?;
         let mut weights = vec![0u8; times.len() * target_count];
         for frame in 1..=target_count {
             weights[frame * target_count + frame - 1] = 255;
@@ -345,21 +285,14 @@ impl GltfWriter {
         Ok(json!({
             "name": self.name,
             "samplers": [{ "input": input, "output": output, "interpolation": "LINEAR" }],
-            "channels": [{ "sampler": 0, "target": { "node": 1, "path": "weights" } }],
+            "channels": [{ "sampler": 0, "target": { "node": MESH_NODE, "path": "weights" } }],
         }))
     }
 
     /// Joints in the bind pose, in which a skin moves nothing: the frames show what it did, and the weights are kept.
     fn skin(&mut self, skin: &Skin, nodes: &mut Vec<Value>) -> Result<Value, WriteError> {
         let first = nodes.len();
-        let binds: Vec<DAffine3> = skin
-            .joints
-            .iter()
-            .map(|joint| {
-                let [x, y, z, origin] = joint.bind.map(DVec3::from);
-                DAffine3::from_mat3_translation(glam::DMat3::from_cols(x, y, z), origin)
-            })
-            .collect();
+        let binds: Vec<DAffine3> = skin.joints.iter().map(Joint::bind_map).collect();
         for (j, joint) in skin.joints.iter().enumerate() {
             let above = joint.parent.map_or(DAffine3::IDENTITY, |parent| binds[parent as usize]);
             let local = DMat4::from(above.inverse() * binds[j]);
@@ -367,17 +300,18 @@ impl GltfWriter {
                 .filter(|&k| skin.joints[k].parent == Some(j as u32))
                 .map(|k| first + k)
                 .collect();
-            let mut node = json!({ "name": joint.name, "matrix": local.to_cols_array() });
+            let mut node = placed(&local);
+            node["name"] = json!(joint.name);
             if !children.is_empty() {
                 node["children"] = json!(children);
             }
             nodes.push(node);
         }
-        let roots = (0..skin.joints.len())
+        let roots: Vec<usize> = (0..skin.joints.len())
             .filter(|&j| skin.joints[j].parent.is_none())
-            .map(|j| first + j);
-        let children: Vec<usize> = core::iter::once(1).chain(roots).collect();
-        nodes[0]["children"] = json!(children);
+            .map(|j| first + j)
+            .collect();
+        nodes[0]["children"] = json!(roots);
         let matrices = binds
             .iter()
             .flat_map(|bind| DMat4::from(bind.inverse()).to_cols_array());

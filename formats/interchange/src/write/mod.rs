@@ -48,6 +48,12 @@ pub enum WriteError {
         /// The file.
         path: PathBuf,
     },
+    /// A puppet is written as glTF alone.
+    #[error("{}: joints and clips are written as glTF: give a name that ends in .glb or .gltf", path.display())]
+    NotGltf {
+        /// The file.
+        path: PathBuf,
+    },
     /// More than the format can count.
     #[error("{}: {count} {what} are more than {format} can count; choose fewer frames, or another format", path.display())]
     TooLarge {

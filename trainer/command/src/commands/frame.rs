@@ -38,19 +38,12 @@ pub struct FrameArguments {
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     /// Frames a second of poses over time, where the format holds them
-    #[arg(long, value_name = "RATE", default_value_t = DEFAULT_FPS, value_parser = parse_rate)]
+    #[arg(long, value_name = "RATE", default_value_t = DEFAULT_FPS, value_parser = super::parse_rate)]
     fps: f64,
     /// File to write: a pose as .obj (with texture coordinates where the package has some), .ply (with normals) or .npy (positions
     /// alone); poses over time, or one, in every format that `sinew convert` writes, without an ending a folder of OBJ files
     #[arg(long, short, value_name = "FILE")]
     output: PathBuf,
-}
-
-fn parse_rate(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(rate) if rate.is_finite() && rate > 0.0 => Ok(rate),
-        _ => Err(format!("`{text}` is not a number of frames a second above 0")),
-    }
 }
 
 fn parse_setting(text: &str) -> Result<(String, f32), String> {

@@ -5,6 +5,7 @@ pub mod convert;
 pub mod demo;
 pub mod encode;
 pub mod evaluate;
+pub mod export;
 pub mod frame;
 pub mod inspect;
 pub mod inspect_file;
@@ -35,5 +36,13 @@ impl Standing {
 
     fn axes(&self) -> Result<Axes, Report> {
         Axes::new(self.up, self.front).into_diagnostic()
+    }
+}
+
+/// A number above 0.
+fn parse_rate(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(rate) if rate.is_finite() && rate > 0.0 => Ok(rate),
+        _ => Err(format!("`{text}` is not a number above 0")),
     }
 }
