@@ -19,6 +19,11 @@ const OUTSIDE_ARROWS: &[(&str, &str, &[&str])] = &[
         "sinew-cortex-m7",
         &["sinew-knobs", "sinew-runtime"],
     ),
+    (
+        "trainer/python",
+        "sinew-python",
+        &["sinew-formats", "sinew-interchange", "sinew-runtime", "sinew-trainer"],
+    ),
     ("tests/embedded", "sinew-embedded", &["sinew-checksum", "sinew-runtime"]),
     (
         "tests/fuzz",

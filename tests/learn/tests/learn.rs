@@ -5,7 +5,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 
 use sinew_bake::Surface;
 use sinew_formats::package::{CompactView, save_package};
-use sinew_interchange::MeshSequence;
+use sinew_interchange::{MeshSequence, ShapeStore};
 use sinew_trainer::components::fields::{Response, responses_of};
 use sinew_trainer::components::kept::{KeepError, KeptComponent};
 use sinew_trainer::components::painted::{PaintError, PaintedRegion, Vertices};
@@ -51,6 +51,46 @@ fn same_bytes_on_one_and_two_threads() {
     let one = learn_on(1, &RunOptions::default());
     let two = learn_on(2, &RunOptions::default());
     assert!(one.package[..] == two.package[..]);
+}
+
+/// Two bars side by side; the second swings the other way.
+fn two_bars() -> MeshSequence {
+    let mut both = bar();
+    let count = both.vertex_count() as u32;
+    let width = 3.0 * both.shapes[0].iter().fold(0.0, |most: f32, p| most.max(p[2].abs()));
+    let second = both.faces.clone().into_iter().map(|face| face.map(|v| v + count));
+    both.faces.extend(second);
+    let shapes: Vec<Vec<[f32; 3]>> = both
+        .shapes
+        .iter()
+        .map(|shape| {
+            let turned = shape.iter().map(|&[x, y, z]| [x, y, width - z]);
+            shape.iter().copied().chain(turned).collect()
+        })
+        .collect();
+    both.shapes = ShapeStore::of_shapes(&shapes);
+    // A mirror image is seen from inside.
+    let half = both.faces.len() / 2;
+    both.faces[half..].iter_mut().for_each(|face| face.swap(1, 2));
+    both
+}
+
+#[test]
+fn same_bytes_by_the_closed_form_alone_and_of_several_pieces() {
+    let sequence = two_bars();
+    let mut config = small();
+    config.fit.steps = 0;
+    let learned = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let learned = pool
+            .expect("a thread pool")
+            .install(|| learn(&sequence, &TRAIN, &config, &RunOptions::default(), &Silent));
+        learned.expect("two bars can be learned").package
+    };
+    let (one, two) = (learned(1), learned(2));
+    assert!(one[..] == two[..]);
+    let view = CompactView::open(&one).expect("a package");
+    assert!(!view.bridges().is_empty(), "the pieces hang together");
 }
 
 /// Asks to stop when the given number of training steps have been reported.

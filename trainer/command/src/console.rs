@@ -1,16 +1,23 @@
 //! What the user sees while a command works: bars with time left, notices, and Ctrl-C.
 
 use core::sync::atomic::{AtomicBool, Ordering};
+use core::time::Duration;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use sinew_trainer::learn::Reporter;
+
+/// How long a stage may take to stop by itself where what is kept stands on the disk already.
+const PATIENCE: Duration = Duration::from_millis(800);
 
 /// One bar at a time on standard error; nothing when quiet.
 pub struct Console {
     quiet: bool,
     bar: Mutex<ProgressBar>,
     stop: Arc<AtomicBool>,
+    /// Whether a stage runs: between stages files are written, and those are to be whole.
+    runs: Arc<AtomicBool>,
 }
 
 impl Console {
@@ -20,17 +27,38 @@ impl Console {
             quiet,
             bar: Mutex::new(ProgressBar::hidden()),
             stop: Arc::new(AtomicBool::new(false)),
+            runs: Arc::new(AtomicBool::new(false)),
         }
     }
 
     /// From now on the first Ctrl-C (or SIGTERM) asks the running stage to stop; a second one ends the program at once.
     pub fn catch_interrupts(&self) {
-        let stop = Arc::clone(&self.stop);
+        self.catch(None);
+    }
+
+    /// The same for work that keeps on the disk what is worth keeping: a stage that has not stopped within a second is left as it is, and
+    /// the program ends with `farewell`.
+    pub fn catch_interrupts_at_once(&self, farewell: &str) {
+        self.catch(Some(farewell.to_owned()));
+    }
+
+    fn catch(&self, farewell: Option<String>) {
+        let (stop, runs) = (Arc::clone(&self.stop), Arc::clone(&self.runs));
         // A handler can be set once in a process, and this is the only place that does.
         let _ = ctrlc::set_handler(move || {
             if stop.swap(true, Ordering::SeqCst) {
                 std::process::exit(130);
             }
+            let (farewell, runs) = (farewell.clone(), Arc::clone(&runs));
+            thread::spawn(move || {
+                thread::sleep(PATIENCE);
+                if let Some(farewell) = farewell
+                    && runs.load(Ordering::SeqCst)
+                {
+                    eprintln!("\n{farewell}");
+                    std::process::exit(130);
+                }
+            });
         });
     }
 
@@ -43,6 +71,7 @@ impl Console {
 
     /// Takes the last bar away.
     pub fn finish(&self) {
+        self.runs.store(false, Ordering::SeqCst);
         self.bar().finish_and_clear();
     }
 
@@ -53,6 +82,7 @@ impl Console {
 
 impl Reporter for Console {
     fn stage(&self, name: &str, total: u64) {
+        self.runs.store(true, Ordering::SeqCst);
         let mut bar = self.bar();
         bar.finish_and_clear();
         if !self.quiet {

@@ -1,5 +1,5 @@
 //! The one device of a performance: a serial port, a MIDI port or a socket behind one trait, chosen by the command line, else
-//! by `knobs.toml`, else the first serial port there is.
+//! by `knobs.toml`, else the first USB serial port there is.
 
 mod choice;
 mod listen;

@@ -13,7 +13,7 @@ use sinew_trainer::bake::{BakeOptions, bake_with};
 use sinew_trainer::config::TrainConfig;
 use sinew_trainer::evaluate::{EvaluationInput, evaluate};
 use sinew_trainer::learn::prepare::Prepared;
-use sinew_trainer::learn::{LearnError, Reporter, RunOptions, learn};
+use sinew_trainer::learn::{LearnError, Reporter, RunOptions, Silent, learn};
 use sinew_trainer::synthesize::{Settings, Subject};
 
 use super::evaluate::{Split, print_table, split};
@@ -94,7 +94,7 @@ pub fn run(arguments: &DemoArguments, console: &Console) -> Result<(), Failure> 
     };
     let (evaluation, shapes) = evaluate(&input, &|done| console.advance(done as u64, "")).into_diagnostic()?;
 
-    let prepared = Prepared::new(&sequence, &train_shapes, &learned.config, &[], console).into_diagnostic()?;
+    let prepared = Prepared::new(&sequence, &train_shapes, &learned.config, &[], &Silent).into_diagnostic()?;
     let subject = ReportSubject {
         sequence: &sequence,
         prepared: &prepared,

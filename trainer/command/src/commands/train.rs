@@ -144,7 +144,11 @@ pub fn run(arguments: &TrainArguments, console: &Console) -> Result<(), Failure>
         )
         .into());
     }
-    console.catch_interrupts();
+    let farewell = format!(
+        "stopped; what is kept of the run is in {}. The same command with --resume goes on.",
+        work_folder.display()
+    );
+    console.catch_interrupts_at_once(&farewell);
     let options = RunOptions {
         time_budget: arguments.time_budget,
         work_folder: Some(work_folder.clone()),
@@ -153,10 +157,7 @@ pub fn run(arguments: &TrainArguments, console: &Console) -> Result<(), Failure>
         Ok(learned) => learned,
         Err(LearnError::Stopped) => {
             console.finish();
-            return Err(Failure::Stopped(format!(
-                "stopped; the run is kept in {}. The same command with --resume goes on.",
-                work_folder.display()
-            )));
+            return Err(Failure::Stopped(farewell));
         }
         Err(error) => {
             return Err(Report::from_err(error).wrap_err("cannot train on this sequence").into());

@@ -1,5 +1,7 @@
 //! What the tests of the command share: how it is run, and what is expected of it.
 
+#![allow(dead_code, reason = "each test uses what it needs")]
+
 use std::path::Path;
 use std::process::{Command, Output};
 
