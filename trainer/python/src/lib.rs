@@ -19,5 +19,6 @@ fn _sinew(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<player::Player>()?;
     module.add_function(wrap_pyfunction!(train::train, module)?)?;
     module.add_function(wrap_pyfunction!(package::load, module)?)?;
+    module.add_function(wrap_pyfunction!(sequence::read, module)?)?;
     Ok(())
 }

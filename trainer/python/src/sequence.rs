@@ -1,8 +1,13 @@
 //! Numpy arrays as a mesh sequence, checked as files are.
 
-use numpy::{AllowTypeChange, PyArrayLike2, PyArrayLike3, PyUntypedArrayMethods};
+use core::ffi::CStr;
+use std::ffi::CString;
+use std::path::PathBuf;
+
+use numpy::{AllowTypeChange, PyArray1, PyArrayLike2, PyArrayLike3, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
-use sinew_interchange::{MAPPED_FROM_BYTES, MeshSequence, ShapeStore};
+use sinew_interchange::{Choice, MAPPED_FROM_BYTES, MeshSequence, ShapeStore, read_sequence};
 
 use crate::errors::{refuse, refused};
 
@@ -77,7 +82,44 @@ pub fn face_array<'py>(py: Python<'py>, faces: &[[u32; 3]]) -> PyResult<Bound<'p
 
 /// A matrix of rows of one length.
 pub fn matrix<'py, T: numpy::Element>(py: Python<'py>, values: Vec<T>, columns: usize) -> PyResult<Bound<'py, PyAny>> {
-    use numpy::{PyArray1, PyArrayMethods};
     let rows = values.len() / columns.max(1);
     Ok(PyArray1::from_vec(py, values).reshape([rows, columns])?.into_any())
+}
+
+/// See the stub file.
+#[pyfunction]
+#[pyo3(signature = (path, *, mesh=None, clip=None))]
+pub fn read<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    mesh: Option<Vec<String>>,
+    clip: Option<String>,
+) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+    let choice = Choice {
+        meshes: mesh.unwrap_or_default(),
+        clip,
+        ..Choice::default()
+    };
+    let read = py
+        .detach(|| read_sequence(&path, &choice, &mut |_, _| {}))
+        .map_err(refused)?;
+    for notice in &read.notices {
+        let text = CString::new(notice.to_string().replace('\0', " "))?;
+        warn(py, &text)?;
+    }
+    let (shape_count, vertex_count) = (read.sequence.shape_count(), read.sequence.vertex_count());
+    let values: Vec<f32> = read
+        .sequence
+        .shapes
+        .iter()
+        .flat_map(|shape| shape.as_flattened())
+        .copied()
+        .collect();
+    let positions = PyArray1::from_vec(py, values).reshape([shape_count, vertex_count, 3])?;
+    Ok((positions.into_any(), face_array(py, &read.sequence.faces)?))
+}
+
+/// A notice that can be lived with.
+pub fn warn(py: Python<'_>, text: &CStr) -> PyResult<()> {
+    PyErr::warn(py, &py.get_type::<PyUserWarning>(), text, 2)
 }

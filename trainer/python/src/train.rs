@@ -8,7 +8,7 @@ use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
 
-use pyo3::exceptions::{PyRuntimeError, PyUserWarning};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use sinew_formats::package::AlignedBytes;
 use sinew_interchange::MeshSequence;
@@ -18,7 +18,7 @@ use sinew_trainer::learn::{LearnError, Reporter, RunOptions, learn};
 
 use crate::errors::{refuse, refused};
 use crate::package::Package;
-use crate::sequence::{FaceArray, Positions, faces_of, sequence_of, vertex_count_of};
+use crate::sequence::{FaceArray, Positions, faces_of, sequence_of, vertex_count_of, warn};
 
 /// How often Ctrl-C is looked for.
 const LISTENING: Duration = Duration::from_millis(50);
@@ -207,7 +207,7 @@ fn pass_on(py: Python<'_>, event: Event, progress: Option<&Py<PyAny>>) -> PyResu
         (Event::Progress(..), None) => Ok(()),
         (Event::Notice(text), _) => {
             let text = CString::new(text.replace('\0', " "))?;
-            PyErr::warn(py, &py.get_type::<PyUserWarning>(), &text, 2)
+            warn(py, &text)
         }
     }
 }

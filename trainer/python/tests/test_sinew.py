@@ -61,6 +61,16 @@ def test_packages_are_kept(tmp_path, package, baked):
     assert package.components[component.parent].level == 0
 
 
+def test_sequences_are_read(tmp_path, sheet):
+    positions, faces = sheet
+    np.save(tmp_path / "positions.npy", positions)
+    np.save(tmp_path / "faces.npy", faces.astype(np.uint32))
+    for given, read in zip(sheet, sinew.read(tmp_path)):
+        np.testing.assert_array_equal(given, read)
+    with pytest.raises(sinew.SinewError, match="missing"):
+        sinew.read(tmp_path / "missing.abc")
+
+
 def test_weights_play_the_shapes_they_came_from(sheet, package):
     positions, _ = sheet
     weights = package.encode(positions, fit="positions")

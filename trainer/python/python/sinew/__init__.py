@@ -10,6 +10,6 @@ Train on arrays, keep one compact package, play it::
 Arrays are float32; others are converted where they come in, and refused where results go out.
 """
 
-from ._sinew import Component, Package, Player, SinewError, load, train
+from ._sinew import Component, Package, Player, SinewError, load, read, train
 
-__all__ = ["Component", "Package", "Player", "SinewError", "load", "train"]
+__all__ = ["Component", "Package", "Player", "SinewError", "load", "read", "train"]

@@ -5,7 +5,7 @@ from typing import Any, Literal, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Component", "Package", "Player", "SinewError", "load", "train"]
+__all__ = ["Component", "Package", "Player", "SinewError", "load", "read", "train"]
 
 class SinewError(ValueError):
     """Sinew refuses an input; the text says what is wrong and what to do."""
@@ -31,6 +31,13 @@ class Component:
 
 def load(path: str | PathLike[str]) -> Package:
     """A package from a file, compact or baked. Refuses damaged ones and those of other versions."""
+
+def read(
+    path: str | PathLike[str], *, mesh: Sequence[str] | None = None, clip: str | None = None
+) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+    """Positions, shape (N, V, 3), and faces, shape (F, 3), of a sequence: a folder of meshes or arrays, or a file of another program in
+    which a mesh moves (Alembic, USD, glTF, PC2, MDD, Maya caches, MD2; not FBX). With several meshes or clips the error names them.
+    """
 
 def train(
     positions: ArrayLike,
