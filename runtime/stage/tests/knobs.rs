@@ -21,8 +21,9 @@ fn simulate(stage: &Stage, dialect: Dialect, script: &str) -> Running {
     simulator.spawn()
 }
 
-/// A hand that turns the first two knobs to and fro, for ever.
-const HANDS: &str = "turn 0 0.5 1.0 300ms\nturn 1 0.5 0.2 300ms\nwait 350ms\nturn 0 1.0 0.5 300ms\nturn 1 0.2 0.5 300ms\nwait 350ms\nrepeat";
+/// A hand that turns the first two knobs to and fro, for ever, through the places where their components rest: whenever a program begins
+/// to listen, they are soon picked up.
+const HANDS: &str = "turn 0 0.3 1.0 300ms\nturn 1 0.7 0.2 300ms\nwait 350ms\nturn 0 1.0 0.3 300ms\nturn 1 0.2 0.7 300ms\nwait 350ms\nrepeat";
 
 /// Weights of a component in a replayed take.
 fn replayed(stage: &Stage, live: &Ran, component: usize) -> Vec<f32> {
@@ -41,7 +42,7 @@ fn a_box_plugged_in_moves_the_coarse_components_and_is_recorded_to_the_bit() {
     for dialect in [Dialect::Deej, Dialect::Packets] {
         let stage = Stage::new();
         let _box = simulate(&stage, dialect, HANDS);
-        let line = "play model.sinew --serial box --headless --for 1500ms --record show.take";
+        let line = "play model.sinew --serial box --headless --for 3s --record show.take";
         let live = stage.run(line, "").expect(0).says(&["box: 8 knobs heard"]);
         for component in [0, 1] {
             let weights = replayed(&stage, &live, component);
@@ -150,11 +151,11 @@ fn knobs_turned_in_order_are_assigned_in_order() {
     let _box = simulate(
         &stage,
         Dialect::Labels,
-        "turn 3 0.5 1.0 300ms\nwait 350ms\nturn 3 1.0 0.5 300ms\nwait 350ms\nrepeat",
+        "turn 3 0.3 1.0 300ms\nwait 350ms\nturn 3 1.0 0.3 300ms\nwait 350ms\nrepeat",
     );
     let live = stage
         .run(
-            "play model.sinew --knobs knobs.toml --headless --for 1500ms --record show.take",
+            "play model.sinew --knobs knobs.toml --headless --for 3s --record show.take",
             "",
         )
         .expect(0);

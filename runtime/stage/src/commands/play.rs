@@ -378,13 +378,13 @@ fn summarize(outcome: &LiveOutcome, live: Live<'_>, quiet: bool) -> Result<(), F
     Ok(())
 }
 
-/// Ends the streams; one that failed is an error.
+/// Ends the streams; one that ended before the show did is an error.
 fn finish_streams(streams: Vec<Stream>, quiet: bool) -> Result<(), Report> {
     let summaries: Vec<_> = streams.into_iter().map(Stream::finish).collect();
     for summary in &summaries {
         say(quiet, &summary.to_string());
     }
-    match summaries.into_iter().find(|summary| summary.fault.is_some()) {
+    match summaries.into_iter().find(|summary| summary.ended) {
         Some(failed) => Err(miette!("{failed}")),
         None => Ok(()),
     }

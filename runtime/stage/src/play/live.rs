@@ -408,10 +408,7 @@ impl<S: FnMut(&[u8])> Segment<'_, '_, '_, '_, '_, S> {
             self.words_us = now_us.max(1);
             words = self.live.device.as_ref().map(|device| device.device_status());
             trouble = trouble.or_else(|| self.file.and_then(TakeFile::fault));
-            trouble = trouble.or_else(|| {
-                let named = |stream: &Stream| stream.fault().map(|fault| format!("a stream ended: {fault}"));
-                self.live.streams.iter().find_map(named)
-            });
+            trouble = trouble.or_else(|| self.live.streams.iter().find_map(Stream::trouble));
             trouble = trouble.or_else(|| self.fault.map(str::to_owned));
         }
         let dropped = self.live.streams.iter().map(Stream::dropped).sum();

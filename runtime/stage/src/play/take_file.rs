@@ -1,18 +1,25 @@
-//! A take on its way to the disk: whole chunks go to a thread that appends them, so that a slow disk does not hold a frame up.
+//! A take on its way to the disk: whole chunks go to a thread that appends them, so that a slow disk, or one that hangs, does not hold a
+//! frame up: it costs the take its end.
 
+use core::time::Duration;
 use std::fs::File;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
+use std::time::Instant;
 
 use crossbeam::channel::{Receiver, Sender, bounded};
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 
 /// Bytes of a take's chunk: some seconds of eight busy knobs.
 pub const CHUNK_BYTES: usize = 16 * 1024;
-/// Chunks that may wait for the disk: half a minute, for chunks are handed over once a second.
+/// Chunks that may wait for the disk.
 const CHUNKS: usize = 32;
+/// How long a frame waits, once in a take, for a disk that took none of them: no hand feels it.
+const STALL: Duration = Duration::from_millis(50);
+/// How long the end of a take waits for the disk.
+const PATIENCE: Duration = Duration::from_secs(10);
 
 /// A file that grows by whole chunks.
 pub struct TakeFile {
@@ -70,7 +77,8 @@ impl TakeFile {
             for chunk in &filled {
                 // After a chunk that is lost, or cut, nothing can be read: one fault ends the take.
                 if let Err(error) = file.write_all(&chunk) {
-                    *told.lock().unwrap_or_else(PoisonError::into_inner) = Some(error.to_string());
+                    let mut told = told.lock().unwrap_or_else(PoisonError::into_inner);
+                    told.get_or_insert_with(|| error.to_string());
                     return;
                 }
                 let _ = give_back.try_send(chunk);
@@ -88,13 +96,26 @@ impl TakeFile {
         })
     }
 
-    /// Takes bytes to append; waits only if the disk is half a minute behind.
+    /// Takes bytes to append. Where the disk takes nothing, the take is cut, and the show goes on: after a chunk that is lost nothing can
+    /// be read.
     pub fn append(&self, bytes: &[u8]) {
-        if let (Ok(mut chunk), Some(full)) = (self.empty.recv(), &self.full) {
-            chunk.clear();
-            chunk.extend_from_slice(bytes);
-            let _ = full.send(chunk);
+        let Some(full) = self.full.as_ref().filter(|_| self.fault().is_none()) else {
+            return;
+        };
+        match self.empty.recv_timeout(STALL) {
+            Ok(mut chunk) => {
+                chunk.clear();
+                chunk.extend_from_slice(bytes);
+                // There is room for all chunks that there are.
+                let _ = full.try_send(chunk);
+            }
+            Err(_) => self.cut("the disk takes nothing"),
         }
+    }
+
+    fn cut(&self, why: &str) {
+        let mut fault = self.fault.lock().unwrap_or_else(PoisonError::into_inner);
+        fault.get_or_insert_with(|| why.to_owned());
     }
 
     /// Why nothing more is written.
@@ -124,10 +145,17 @@ impl TakeFile {
 
     fn end(&mut self) {
         self.full = None;
-        if let Some(thread) = self.thread.take() {
-            // It does not panic; if it did, the file holds whole chunks all the same.
-            let _ = thread.join();
+        let Some(thread) = self.thread.take() else { return };
+        let until = Instant::now() + PATIENCE;
+        while !thread.is_finished() {
+            if Instant::now() > until {
+                // The thread goes on as long as the program does; whole chunks are in the file.
+                return self.cut("the disk does not answer");
+            }
+            thread::sleep(Duration::from_millis(2));
         }
+        // It does not panic; if it did, the file holds whole chunks all the same.
+        let _ = thread.join();
     }
 }
 
@@ -195,5 +223,31 @@ mod tests {
         };
         file.append(b"lost");
         assert!(file.finish().unwrap_err().to_string().contains("is cut: no space"));
+    }
+
+    #[test]
+    fn a_disk_that_hangs_holds_no_frame_up() {
+        let folder = tempfile::tempdir().unwrap();
+        let (give_back, empty) = bounded(2);
+        (0..2).for_each(|_| give_back.send(Vec::new()).unwrap());
+        // Nobody takes the chunks.
+        let (full, filled) = bounded::<Vec<u8>>(2);
+        let file = TakeFile {
+            path: folder.path().join("a.take"),
+            empty,
+            full: Some(full),
+            thread: None,
+            fault: Arc::new(Mutex::new(None)),
+        };
+        for n in 0..5_u8 {
+            file.append(&[n]);
+        }
+        assert!(file.fault().unwrap().contains("takes nothing"));
+        // The disk wakes up: what it had is whole, and nothing follows a gap.
+        let taken: Vec<_> = filled.try_iter().collect();
+        give_back.send(Vec::new()).unwrap();
+        file.append(b"late");
+        assert_eq!((taken, filled.len()), (vec![vec![0], vec![1]], 0));
+        assert!(file.finish().unwrap_err().to_string().contains("is cut"));
     }
 }

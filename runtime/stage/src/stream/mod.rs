@@ -1,5 +1,5 @@
 //! Where the moving mesh goes: OBJ files, raw floats, UDP. Each stream has a thread and three buffers, so that a slow disk or a
-//! slow reader costs the stream frames and the performance nothing. Layouts are in `docs/streams.md`.
+//! slow reader costs the stream frames and the performance nothing. A frame that fails is counted and the next one tried. Layouts are in `docs/streams.md`.
 
 mod packets;
 mod spec;
@@ -39,9 +39,22 @@ pub struct Stream {
     empty: Receiver<Shape>,
     full: Option<Sender<Shape>>,
     thread: Option<JoinHandle<()>>,
-    fault: Arc<Mutex<Option<String>>>,
+    health: Arc<Mutex<Health>>,
     sent: u64,
     dropped: u64,
+}
+
+/// What the thread has met.
+#[derive(Debug, Clone, Default)]
+struct Health {
+    /// Frames that failed.
+    lost: u64,
+    /// Why the last of them did.
+    last: Option<String>,
+    /// Whether the last frame was one of them.
+    fails: bool,
+    /// Whether the stream is over.
+    ended: bool,
 }
 
 /// How a stream did.
@@ -53,8 +66,12 @@ pub struct StreamSummary {
     pub sent: u64,
     /// Frames left out because the last ones were still being written.
     pub dropped: u64,
-    /// Why it ended early.
-    pub fault: Option<String>,
+    /// Frames that could not be written.
+    pub lost: u64,
+    /// Why the last of them could not.
+    pub last: Option<String>,
+    /// Whether that ended the stream.
+    pub ended: bool,
 }
 
 impl Stream {
@@ -80,18 +97,27 @@ impl Stream {
             // There is room for all of them.
             let _ = give_back.try_send(shape);
         }
-        let fault = Arc::new(Mutex::new(None));
-        let told = Arc::clone(&fault);
+        let health = Arc::new(Mutex::new(Health::default()));
+        let told = Arc::clone(&health);
         let thread = thread::Builder::new().name("sinew-stream".to_owned()).spawn(move || {
-            let mut run = || -> Result<(), String> {
-                for shape in &filled {
-                    sink.write(&shape)?;
-                    let _ = give_back.try_send(shape);
+            let tell = |outcome: Result<(), String>, ends: bool| -> bool {
+                let mut told = told.lock().unwrap_or_else(PoisonError::into_inner);
+                told.fails = outcome.is_err();
+                if let Err(message) = outcome {
+                    told.lost += 1;
+                    told.last = Some(message);
+                    told.ended = ends;
                 }
-                sink.finish()
+                told.ended
             };
-            if let Err(message) = run() {
-                *told.lock().unwrap_or_else(PoisonError::into_inner) = Some(message);
+            for shape in &filled {
+                if tell(sink.write(&shape), sink.ends_with_a_fault()) {
+                    return;
+                }
+                let _ = give_back.try_send(shape);
+            }
+            if let Err(message) = sink.finish() {
+                tell(Err(message), true);
             }
         });
         let thread = thread.map_err(|error| miette::miette!("no thread for the stream {spec}: {error}"))?;
@@ -100,7 +126,7 @@ impl Stream {
             empty,
             full: Some(full),
             thread: Some(thread),
-            fault,
+            health,
             sent: 0,
             dropped: 0,
         })
@@ -128,9 +154,19 @@ impl Stream {
         }
     }
 
-    /// Why it ended, if it did.
-    pub fn fault(&self) -> Option<String> {
-        self.fault.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    /// What is wrong with it now, in words.
+    pub fn trouble(&self) -> Option<String> {
+        let health = self.health();
+        let why = health.last.as_deref().unwrap_or_default();
+        match (health.ended, health.fails) {
+            (true, _) => Some(format!("a stream ended: {why}")),
+            (false, true) => Some(format!("the stream {} fails: {why}", self.spec)),
+            (false, false) => None,
+        }
+    }
+
+    fn health(&self) -> Health {
+        self.health.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// Frames left out.
@@ -141,11 +177,14 @@ impl Stream {
     /// Writes what waits and ends.
     pub fn finish(mut self) -> StreamSummary {
         self.end();
+        let Health { lost, last, ended, .. } = self.health();
         StreamSummary {
             name: self.spec.to_string(),
             sent: self.sent,
             dropped: self.dropped,
-            fault: self.fault(),
+            lost,
+            last,
+            ended,
         }
     }
 
@@ -154,7 +193,8 @@ impl Stream {
         if let Some(thread) = self.thread.take()
             && thread.join().is_err()
         {
-            *self.fault.lock().unwrap_or_else(PoisonError::into_inner) = Some("its thread failed".to_owned());
+            let mut health = self.health.lock().unwrap_or_else(PoisonError::into_inner);
+            (health.ended, health.last) = (true, Some("its thread failed".to_owned()));
         }
     }
 }
@@ -171,9 +211,17 @@ impl core::fmt::Display for StreamSummary {
         if self.dropped > 0 {
             write!(out, ", {} left out because it was behind", self.dropped)?;
         }
-        match &self.fault {
-            Some(fault) => write!(out, "; ended early: {fault}"),
-            None => Ok(()),
+        let last = self.last.as_deref().unwrap_or_default();
+        if self.ended {
+            write!(out, "; ended early: {last}")
+        } else if self.lost > 0 {
+            write!(
+                out,
+                "; {} could not be written, the last: {last}",
+                count(self.lost, "frame")
+            )
+        } else {
+            Ok(())
         }
     }
 }

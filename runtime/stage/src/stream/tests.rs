@@ -43,7 +43,10 @@ fn obj_files_are_numbered_or_replaced() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("frames");
     let summary = play(StreamSpec::ObjFolder(out.clone()), 3);
-    assert_eq!((summary.sent, summary.dropped, summary.fault), (3, 0, None));
+    assert_eq!(
+        (summary.sent, summary.dropped, summary.lost, summary.ended),
+        (3, 0, 0, false)
+    );
     let read = read_sequence(&out, &Choice::default(), &mut |_, _| {})
         .unwrap()
         .sequence;
@@ -93,7 +96,7 @@ fn datagrams_put_together_are_the_frame() {
         }
     }
     assert_eq!(floats, positions.as_flattened());
-    assert_eq!(stream.finish().fault, None);
+    assert_eq!(stream.finish().lost, 0);
 }
 
 #[test]
@@ -104,7 +107,7 @@ fn weights_go_alone_and_nobody_need_listen() {
         .unwrap()
         .port();
     let summary = play(StreamSpec::UdpWeights(port), 50);
-    assert_eq!((summary.sent, summary.fault), (50, None), "the port is closed");
+    assert_eq!((summary.sent, summary.lost), (50, 0), "the port is closed");
 }
 
 #[test]
@@ -121,6 +124,35 @@ fn a_slow_target_costs_the_stream_frames_and_a_broken_one_is_said() {
         summary.dropped > 0 && summary.sent + summary.dropped == 1000,
         "{summary:?}"
     );
-    assert!(summary.to_string().contains("ended early"), "{summary}");
+    assert!(summary.to_string().contains("could not be written"), "{summary}");
     assert!(Stream::start(StreamSpec::Obj(folder.path().join("no/live.obj")), 4, 2, &FACES).is_err());
+}
+
+#[test]
+fn a_frame_that_cannot_be_written_is_counted_and_the_next_one_tried() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("frames");
+    let mut stream = Stream::start(StreamSpec::ObjFolder(out.clone()), 4, 2, &FACES).unwrap();
+    let offer = |stream: &mut Stream, n: u64| {
+        stream.offer(n, n, &shape(n), &[0.0; 2], true);
+        let until = std::time::Instant::now() + Duration::from_secs(10);
+        while stream.empty.len() < BUFFERS && std::time::Instant::now() < until {
+            thread::sleep(Duration::from_millis(1));
+        }
+    };
+    offer(&mut stream, 1);
+    // The folder goes away, as a stick or a share does, and comes back.
+    std::fs::remove_dir_all(&out).unwrap();
+    offer(&mut stream, 2);
+    assert!(stream.trouble().unwrap().contains("fails"));
+    std::fs::create_dir(&out).unwrap();
+    offer(&mut stream, 3);
+    assert_eq!(stream.trouble(), None);
+    let summary = stream.finish();
+    assert_eq!((summary.lost, summary.ended), (1, false));
+    assert!(
+        summary.to_string().contains("1 frame could not be written"),
+        "{summary}"
+    );
+    assert!(out.join("frame_000003.obj").exists());
 }

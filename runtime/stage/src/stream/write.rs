@@ -88,6 +88,11 @@ impl Sink {
         })
     }
 
+    /// Whether a frame that failed ends the stream: what follows half a frame cannot be read. Files and datagrams stand for themselves.
+    pub fn ends_with_a_fault(&self) -> bool {
+        matches!(self, Self::Raw(_))
+    }
+
     /// Writes a frame.
     pub fn write(&mut self, shape: &Shape) -> Result<(), String> {
         match self {
