@@ -17,8 +17,8 @@ use crate::player::Player;
 use crate::sequence::{Positions, face_array, matrix, sequence_of, vertex_count_of};
 
 /// One component and its control.
-#[pyclass(frozen, get_all, module = "sinew")]
-#[derive(Clone)]
+#[pyclass(frozen, eq, get_all, module = "sinew")]
+#[derive(Clone, PartialEq)]
 pub struct Component {
     name: String,
     minimum: f32,

@@ -53,7 +53,7 @@ def test_packages_are_kept(tmp_path, package, baked):
     assert (package.kind, baked.kind) == ("compact", "baked")
     # A bone that no vertex needs is left out.
     assert 1 <= baked.bone_count <= 6
-    assert [c.name for c in package.components] == [c.name for c in baked.components]
+    assert package.components == baked.components
     np.testing.assert_array_equal(package.rest, baked.rest)
     np.testing.assert_array_equal(package.faces, baked.faces)
     component = package.components[-1]
