@@ -333,7 +333,7 @@ mod tests {
     #[test]
     fn kept_keys_hold_the_tolerance_at_every_frame() {
         let at = |n: usize| {
-            let t = n as f32 / 10.0;
+            let t = n as f32 / 40.0;
             JointPose {
                 scale: [1.0 + 0.2 * t.sin(), 1.0, 1.0],
                 ..turned((1.3 * t).sin() * 4.0, t.cos() * 3.0)
