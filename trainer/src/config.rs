@@ -1,5 +1,7 @@
 //! The trainer's configuration: one TOML file, every value with a default, saved with the result.
 
+mod refine;
+
 use serde::{Deserialize, Serialize};
 
 use crate::components::extract::PruneSettings;
@@ -8,10 +10,11 @@ use crate::components::mix::MixSettings;
 use crate::components::painted::PaintedRegion;
 use crate::evaluate::{EncoderKind, EncoderSettings};
 use crate::features::gradient::{FeatureSettings, Weighting};
-use crate::learn::refine::RefineSettings;
 use crate::network::activation::Activation;
 use crate::network::loss::LossSettings;
 use crate::training::fit::FitSettings;
+
+pub use refine::RefineSettings;
 
 /// Everything that decides what a training run learns, apart from the shapes themselves.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -478,23 +481,4 @@ fn merge(into: &mut toml::Table, from: toml::Table) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn recipes_are_configurations_and_files_change_only_what_they_name() {
-        for recipe in [Recipe::Local, Recipe::Paper] {
-            let config = recipe.config();
-            assert_eq!(TrainConfig::from_toml(&config.to_toml()).ok(), Some(config.clone()));
-            let changed = config
-                .with_toml("seed = 4\n[fit.loss]\nsparsity_distances = [0.3]\n")
-                .unwrap();
-            let mut expected = config;
-            expected.seed = 4;
-            expected.fit.loss.sparsity_distances = vec![0.3];
-            assert_eq!(changed, expected);
-        }
-        let error = Recipe::Paper.config().with_toml("[fit]\nspeed = 3\n").unwrap_err();
-        assert!(error.to_string().contains("speed"), "{error}");
-    }
-}
+mod tests;

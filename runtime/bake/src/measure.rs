@@ -10,7 +10,7 @@ use sinew_runtime::{Basis, BoneTransform, BonesInfo, TierChoice};
 
 use crate::BakeError;
 use crate::bones::{shape_poses, slider_poses};
-use crate::mesh::topology::{cross, difference, dot, length};
+use crate::mesh::vector::{cross, difference, dot, length};
 use crate::play::{Played, play, pose};
 
 /// Poses of each kind: as many as make so many vertices, within these bounds.

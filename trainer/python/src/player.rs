@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use sinew_formats::package::AlignedBytes;
 use sinew_runtime::{
     Basis, BoneMaps, BoneOutput, Controls, Drag, Frame, FrameError, FrameOutcome, Handles, HandlesLayout, Kernels,
-    OpenError, TierChoice, Workspace, WorkspaceLayout,
+    TierChoice, Workspace, WorkspaceLayout,
 };
 
 use crate::errors::{refuse, refused};
@@ -50,10 +50,6 @@ pub struct Player {
     bone_count: usize,
 }
 
-fn unreachable_open(error: OpenError) -> PyErr {
-    refused(error)
-}
-
 impl Player {
     /// A player of a baked package, of its nearest tier or of the named one.
     pub fn new(bytes: Arc<AlignedBytes>, tier: Option<&str>) -> PyResult<Self> {
@@ -74,7 +70,7 @@ impl Player {
             memory,
             held_memory,
             weights: vec![0.0; component_count],
-            basis_builder: |bytes: &Arc<AlignedBytes>| Basis::open(bytes).map_err(unreachable_open),
+            basis_builder: |bytes: &Arc<AlignedBytes>| Basis::open(bytes).map_err(refused),
             controls_builder: |basis, weights: &mut Vec<f32>| Controls::new(basis, weights).map_err(refused),
             workspace_builder: |basis, memory: &mut Vec<u8>| {
                 Workspace::for_tier(basis, tier, memory, Kernels::detect()).map_err(refused)

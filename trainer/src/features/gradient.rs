@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::refine::Refinement;
 use crate::mesh::cotangent::{EdgeWeights, half_cotangents, positive_mean};
-use crate::mesh::topology::{Topology, corners, cross, difference, is_flat};
+use crate::mesh::topology::{Topology, corners, is_flat};
+use crate::mesh::vector::{cross, difference};
 
 /// A ring is undetermined when its least principal moment is below this share of the greatest: rounding would speak.
 const MOMENT_FLOOR: f64 = 1e-7;

@@ -11,7 +11,8 @@ use faer::sparse::Triplet;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::mesh::sparse_factor::{FactorError, SparseFactor};
-use crate::mesh::topology::{Topology, difference};
+use crate::mesh::topology::Topology;
+use crate::mesh::vector::difference;
 
 /// How much a change of gradients costs against what the solve misses. On the gallop, at normal weight 1, 1 leaves three
 /// quarters of the miss, 0.3 half, 0.1 a third, and 0.01 a tenth but flips rings.

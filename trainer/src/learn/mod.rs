@@ -5,6 +5,7 @@
 //! features, distances) -> choose how to mix, by held-out shapes ([`hold_out`]) -> the closed-form start, and steps of the optimiser
 //! where they are asked for -> [`mod@refine`] -> [`package`] (extract, prune, measure).
 
+pub mod draft;
 pub mod hold_out;
 pub mod package;
 mod pieces;
@@ -32,8 +33,8 @@ use crate::evaluate::PlayError;
 use crate::mesh::sparse_factor::FactorError;
 use crate::network::weights::StackWeights;
 use crate::training::fit::{FitOutcome, HistoryPoint, TrainingError};
+use draft::PackageError;
 use hold_out::HeldOut;
-use package::PackageError;
 use prepare::Prepared;
 use review::review;
 use run_folder::{Plan, RunFolder, RunFolderError};

@@ -5,8 +5,8 @@ use rayon::prelude::*;
 use sinew_formats::package::{NO_PIECE, limits};
 use sinew_runtime::Basis;
 
-use super::package::{PackageError, spread, with_players};
-use super::prepare::Prepared;
+use super::draft::{PackageError, with_players};
+use super::prepare::{Prepared, spread};
 use super::trial::Trial;
 use crate::components::extract::{LearnedBasis, Pieces};
 use crate::components::offsets::fit_offsets;

@@ -7,7 +7,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 use rayon::prelude::*;
 use sinew_interchange::{MeshSequence, RenderSurface};
 
-use super::package::spread;
 use super::{LearnError, Reporter};
 use crate::components::bends::bend_distances;
 use crate::components::extract::BasisFrame;
@@ -366,6 +365,12 @@ fn with_mirror_images(
     reporter.notice("the reference is its own mirror image, nearly: mirror images of the shapes are learned from, too");
     let all: Vec<Vec<[f32; 9]>> = network.iter().map(<[_]>::to_vec).chain(images).collect();
     Arc::new(ShapeStore::of_shapes(&all))
+}
+
+/// Up to `count` of `shapes`, spread evenly.
+pub(super) fn spread(shapes: &[usize], count: usize) -> impl Iterator<Item = usize> {
+    let count = count.min(shapes.len());
+    (0..count).map(move |i| shapes[i * shapes.len() / count])
 }
 
 fn narrowed(values: Vec<f64>) -> Vec<f32> {

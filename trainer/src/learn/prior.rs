@@ -4,8 +4,8 @@
 use nalgebra::DMatrix;
 use sinew_runtime::Basis;
 
-use super::package::{PackageError, bounding_diagonal, spread, with_players};
-use super::prepare::Prepared;
+use super::draft::{PackageError, bounding_diagonal, with_players};
+use super::prepare::{Prepared, spread};
 use super::trial::Trial;
 use crate::components::extract::LearnedBasis;
 use crate::components::prior::{Sight, WeightPrior};

@@ -8,34 +8,15 @@ use core::ops::Range;
 
 use nalgebra::{Cholesky, DMatrix, SMatrix};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use sinew_formats::package::{FEATURE_COUNT, GraphConvRecord};
 
-use super::package::{PackageError, draft};
+use super::draft::PackageError;
+use super::package::draft;
 use super::prepare::Prepared;
 use super::trial::Trial;
 use super::{LearnError, Reporter};
-use crate::config::TrainConfig;
+use crate::config::{RefineSettings, TrainConfig};
 use crate::network::weights::StackWeights;
-
-/// How components are refined for positions.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct RefineSettings {
-    /// Turns of finding weights and fitting components; 0 leaves the components as the fit left them.
-    pub rounds: usize,
-    /// Mixes a turn, fresh ones each. Several times the number of components, or they are learned by heart.
-    pub samples: usize,
-}
-
-impl Default for RefineSettings {
-    fn default() -> Self {
-        Self {
-            rounds: 3,
-            samples: 240,
-        }
-    }
-}
 
 /// Number of the first mix of the first turn, far from those that everything else sees.
 const REFINE_MIXES: u64 = 1 << 43;

@@ -7,7 +7,8 @@ use sinew_interchange::MeshSequence;
 use super::LearnError;
 use super::prepare::moves;
 use crate::features::align::{RigidMotion, widened};
-use crate::mesh::topology::{Topology, difference, is_flat, length};
+use crate::mesh::topology::{Topology, is_flat};
+use crate::mesh::vector::{difference, length};
 
 /// A shape whose edges are off by less than this share of their length is never taken for broken.
 const BROKEN_STRAIN: f64 = 0.9;

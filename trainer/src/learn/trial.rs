@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use sinew_formats::package::AlignedBytes;
 use sinew_runtime::Basis;
 
-use super::package::{Draft, PackageError, with_players};
+use super::draft::{Draft, PackageError, with_players};
 use super::prepare::Prepared;
 use crate::bake::bake;
 use crate::components::extract::LearnedBasis;

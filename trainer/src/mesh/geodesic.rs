@@ -9,7 +9,8 @@ use rayon::prelude::*;
 
 use super::cotangent::EdgeWeights;
 use super::sparse_factor::{FactorError, SparseFactor};
-use super::topology::{Topology, corners, cross, difference, dot, is_flat, length, names_a_vertex_twice};
+use super::topology::{Topology, corners, is_flat, names_a_vertex_twice};
+use super::vector::{cross, difference, dot, length};
 
 /// Heat falls by e each step of length sqrt(time). The step is an edge, but no less than this share of the bounding box,
 /// or heat at the far end of a long mesh would underflow.

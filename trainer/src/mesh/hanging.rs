@@ -8,7 +8,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::bridge::{BRIDGES_A_PIECE, Group, bridge_edges_with};
-use super::topology::{Topology, difference};
+use super::topology::Topology;
+use super::vector::difference;
 use crate::features::gradient::{FeatureSettings, GradientFit, Weighting};
 
 /// Vertices of a group that bridges may start on: so many nearest to the rest, and as many again, spread over the group.

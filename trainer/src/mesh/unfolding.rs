@@ -4,7 +4,8 @@
 
 use std::collections::BinaryHeap;
 
-use super::topology::{Topology, difference, length, names_a_vertex_twice};
+use super::topology::{Topology, names_a_vertex_twice};
+use super::vector::{difference, length};
 
 /// A new distance counts if it is shorter by this share: keeps rounding from going in circles.
 const GAIN: f64 = 1e-12;

@@ -1,12 +1,10 @@
-//! Rules of the baked payload: what the frame path relies on without looking. The patches of
-//! both tiers obey the same rules, and their errors bear the same names.
+//! Rules of the baked payload: what the frame path relies on without looking.
 
 use super::{
-    super::{
-        BakedView, FAN_VERTICES, GROUP_NODES, IndexSlice, OpenError, PatchesView, QUAD, SolveView, TILE_ENTRIES, limits,
-    },
-    BlockLinks, after, ascending_below, below, bones, control, count, indices, names, offsets, positions, positive,
-    prior, same_count, surface, tree, value_scales, within,
+    super::{BakedView, FAN_VERTICES, IndexSlice, OpenError, QUAD, SolveView, TILE_ENTRIES, limits},
+    BlockLinks, after, ascending_below, bones, control, count, indices, names, offsets,
+    patches::patches,
+    positions, positive, prior, same_count, surface, tree, value_scales, within,
 };
 
 /// Proves every promise that [`super::super::BakedBasis`] makes.
@@ -192,36 +190,6 @@ fn distinct(solve: &SolveView<'_>, node_count: usize) -> Result<(), OpenError> {
                 }
                 *word |= bit;
             }
-        }
-    }
-    Ok(())
-}
-
-pub(super) fn patches(view: &BakedView<'_>, patches: &PatchesView<'_>, node_count: usize) -> Result<(), OpenError> {
-    let owners = patches.owners;
-    count("patch_owners", owners.len(), 0, limits::PATCHES)?;
-    same_count("patch_values", patches.values.len(), owners.len())?;
-    let group_count = node_count.div_ceil(GROUP_NODES);
-    offsets("patch_offsets", patches.offsets, group_count, owners.len())?;
-    for row in patches.offsets.windows(2) {
-        let mut previous = None;
-        for index in row[0] as usize..row[1] as usize {
-            let [component, block] = owners[index];
-            below("patch_owners", index, u32::from(component), view.component_count())?;
-            if previous.is_some_and(|previous| component <= previous) {
-                return Err(OpenError::NotAscending {
-                    field: "patch_owners",
-                    index,
-                });
-            }
-            // Components stand in block order, so the blocks ascend too.
-            if view.component(component as usize).block != u32::from(block) {
-                return Err(OpenError::NotContiguous {
-                    field: "patch_owners",
-                    index,
-                });
-            }
-            previous = Some(component);
         }
     }
     Ok(())

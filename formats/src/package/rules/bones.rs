@@ -2,8 +2,9 @@
 
 use super::{
     super::{BakedView, BoneGroup, BonesView, GROUP_NODES, OpenError, PoseError, SKIN_WEIGHT_SUM, SkinView, limits},
-    baked::patches,
-    below, count, positions, same_count, within,
+    below, count,
+    patches::patches,
+    positions, same_count, within,
 };
 
 /// Proves every promise that [`super::super::BakedBones`] makes.

@@ -5,6 +5,7 @@
 pub(super) mod baked;
 mod bones;
 pub(super) mod compact;
+mod patches;
 #[cfg(all(test, feature = "alloc"))]
 mod tests;
 

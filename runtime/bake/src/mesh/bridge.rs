@@ -5,7 +5,7 @@
 //! caller chooses.
 
 use super::nearest::NearestVertices;
-use super::topology::{difference, dot};
+use super::vector::{difference, dot};
 
 /// Bridges from one piece to the rest: enough that it neither tilts nor twists on them.
 pub const BRIDGES_A_PIECE: usize = 8;

@@ -1,7 +1,8 @@
 //! Cotangent edge weights of the rest shape (method section 1): topology and rest shape -> [`EdgeWeights`] -> fit of the
 //! deformation gradients, and the Laplacian of the solve.
 
-use super::topology::{Topology, corners, cross, difference, dot, is_flat, length, names_a_vertex_twice};
+use super::topology::{Topology, corners, is_flat, names_a_vertex_twice};
+use super::vector::{cross, difference, dot, length};
 
 /// One angle's cotangent is held within this: about 3 degrees. A sliver must not outweigh its whole neighbourhood.
 const COTANGENT_BOUND: f64 = 20.0;

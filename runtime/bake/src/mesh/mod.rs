@@ -4,6 +4,7 @@ pub mod bridge;
 pub mod cotangent;
 pub mod nearest;
 pub mod topology;
+pub mod vector;
 
 #[cfg(any(test, feature = "fixture"))]
 pub mod shapes;

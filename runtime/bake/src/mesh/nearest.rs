@@ -1,7 +1,7 @@
 //! Nearest vertices in space, outside one's own group: a balanced tree of axis-aligned splits. Used to lay bridges, and to
 //! find the vertex on the other side of a mirror plane.
 
-use super::topology::{difference, dot};
+use super::vector::{difference, dot};
 
 /// Vertices in a leaf: small enough that scanning beats descending.
 const LEAF_SIZE: usize = 8;

@@ -4,6 +4,7 @@
 //! Everything after this sees one connected graph: an eyeball or a button hangs on bridges and follows the head.
 
 use super::bridge::bridge_edges;
+use super::vector::{cross, difference, dot, length};
 
 /// A face counts as flat when twice its area is below this share of its longest edge squared: rounding, not shape.
 pub const FLAT_FACE: f64 = 1e-12;
@@ -166,30 +167,6 @@ impl Topology {
         }
         areas.iter().map(|area| (area / mean).max(AREA_FLOOR)).collect()
     }
-}
-
-/// `b - a`.
-pub fn difference(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [b[0] - a[0], b[1] - a[1], b[2] - a[2]]
-}
-
-/// Scalar product.
-pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// Vector product.
-pub fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
-}
-
-/// Euclidean length.
-pub fn length(a: [f64; 3]) -> f64 {
-    dot(a, a).sqrt()
 }
 
 /// Corners of a face.

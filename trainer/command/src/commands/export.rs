@@ -10,13 +10,15 @@ use clap::Args;
 use miette::{IntoDiagnostic, WrapErr, miette};
 use serde_json::{Value, json};
 use sinew_formats::package::{AlignedBytes, PackageKind};
-use sinew_interchange::{DEFAULT_FPS, OutputSurface, Puppet, RenderSurface, UpAxis, write_puppet};
-use sinew_runtime::Basis;
+use sinew_interchange::{DEFAULT_FPS, OutputSurface, Puppet, UpAxis, write_puppet};
+use sinew_runtime::{Basis, Workspace, WorkspaceLayout};
 use sinew_trainer::bake::{BakeOptions, BoneCount, BoneOptions, Influences, bake_bytes_with};
+use sinew_trainer::evaluate::Player;
 use sinew_trainer::learn::Reporter;
+use sinew_trainer::learn::draft::bounding_diagonal;
 
 use morphs::{Morphs, fit_morphs};
-use played::{ClipReport, ClipSettings, Player, diagonal};
+use played::{ClipReport, ClipSettings};
 use rig::Rig;
 use sinew_command::console::Console;
 use sinew_command::inputs::{Failure, check_output, load_package};
@@ -95,9 +97,14 @@ pub fn run(arguments: &ExportArguments, console: &Console) -> Result<(), Failure
     let basis = Basis::open(&baked)
         .into_diagnostic()
         .wrap_err_with(|| format!("{path} is no usable package"))?;
-    let mut player = Player::new(basis)?;
-    let rest = player.rest();
-    let diagonal = diagonal(&rest);
+    let mut memory = vec![0; WorkspaceLayout::for_basis(&basis).unaligned_bytes()];
+    let mut player = Player::new(&basis, Workspace::new(&basis, &mut memory).into_diagnostic()?);
+    let rest: Vec<[f32; 3]> = basis
+        .slot_from_vertex()
+        .iter()
+        .map(|slot| basis.rest_positions()[slot as usize])
+        .collect();
+    let diagonal = f64::from(bounding_diagonal(&rest));
     let names: Vec<&str> = basis.components().map(|component| component.name).collect();
     let rig = match (basis.bones(), arguments.bones) {
         (Some(_), Some(BoneCount(None))) | (None, _) => None,
@@ -129,8 +136,8 @@ pub fn run(arguments: &ExportArguments, console: &Console) -> Result<(), Failure
         let rows = read_weights(file, &names)?;
         console.stage(&format!("clip {name}"), rows.len() as u64);
         let (clip, report) = match &rig {
-            Some(rig) => rig.clip(&name, &rows, &mut player, &settings)?,
-            None => morphs.clip(&name, &rows, &mut player, &rest, &settings)?,
+            Some(rig) => rig.clip(&name, &rows, &basis, &mut player, &settings)?,
+            None => morphs.clip(&name, &rows, &basis, &mut player, &rest, &settings)?,
         };
         console.finish();
         clips.push(clip);
@@ -138,12 +145,7 @@ pub fn run(arguments: &ExportArguments, console: &Console) -> Result<(), Failure
     }
 
     let faces = basis.faces().to_vec();
-    let drawn = basis.surface();
-    let render = drawn.has_texture().then(|| RenderSurface {
-        vertices: basis.render_vertices().collect(),
-        uvs: drawn.uvs.to_vec(),
-        faces: drawn.drawn_faces().to_vec(),
-    });
+    let render = super::render_surface(&basis);
     let dress = rig.as_ref().map(|rig| rig.dress.clone()).unwrap_or_default();
     let stem = arguments.package.file_stem().and_then(|stem| stem.to_str());
     let puppet = Puppet {

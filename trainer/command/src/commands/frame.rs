@@ -5,9 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use miette::{IntoDiagnostic, Report, WrapErr, miette};
 use sinew_formats::package::{AlignedBytes, PackageKind};
-use sinew_interchange::{
-    DEFAULT_FPS, OutputSurface, RenderSurface, create_writer, write_npy_vertices, write_obj, write_ply,
-};
+use sinew_interchange::{DEFAULT_FPS, OutputSurface, create_writer, write_npy_vertices, write_obj, write_ply};
 use sinew_runtime::{Basis, Controls, Frame, Workspace, WorkspaceLayout};
 use sinew_trainer::bake::bake_bytes;
 use sinew_trainer::learn::Reporter;
@@ -105,12 +103,8 @@ pub fn run(arguments: &FrameArguments, console: &Console) -> Result<(), Failure>
     };
     let mut memory = vec![0_u8; WorkspaceLayout::for_basis(&basis).unaligned_bytes()];
     let mut workspace = Workspace::new(&basis, &mut memory).into_diagnostic()?;
-    let (faces, drawn) = (basis.faces().to_vec(), basis.surface());
-    let render = drawn.has_texture().then(|| RenderSurface {
-        vertices: basis.render_vertices().collect(),
-        uvs: drawn.uvs.to_vec(),
-        faces: drawn.drawn_faces().to_vec(),
-    });
+    let faces = basis.faces().to_vec();
+    let render = super::render_surface(&basis);
     let stem = arguments.package.file_stem().and_then(|stem| stem.to_str());
     let surface = OutputSurface {
         render: render.as_ref(),

@@ -15,6 +15,8 @@ pub mod train;
 
 use clap::Args;
 use miette::{IntoDiagnostic, Report};
+use sinew_interchange::RenderSurface;
+use sinew_runtime::Basis;
 use sinew_trainer::components::labels::{Axes, Axis};
 
 /// Which way the rest shape stands, for labels.
@@ -37,6 +39,16 @@ impl Standing {
     fn axes(&self) -> Result<Axes, Report> {
         Axes::new(self.up, self.front).into_diagnostic()
     }
+}
+
+/// What an engine draws of a package, where it has texture coordinates.
+fn render_surface(basis: &Basis<'_>) -> Option<RenderSurface> {
+    let drawn = basis.surface();
+    drawn.has_texture().then(|| RenderSurface {
+        vertices: basis.render_vertices().collect(),
+        uvs: drawn.uvs.to_vec(),
+        faces: drawn.drawn_faces().to_vec(),
+    })
 }
 
 /// A number above 0.

@@ -14,7 +14,7 @@ use sinew_trainer::components::labels::Axes;
 use sinew_trainer::evaluate::{Evaluation, NormalisedPair, Reconstructions, ScoreError, Scores, score};
 use sinew_trainer::features::acap::AcapFeatures;
 use sinew_trainer::features::align::align_shapes;
-use sinew_trainer::learn::package::{PackageError, with_players};
+use sinew_trainer::learn::draft::{PackageError, with_players};
 use sinew_trainer::learn::prepare::Prepared;
 use sinew_trainer::learn::{Learned, Reporter};
 
@@ -80,7 +80,7 @@ pub fn illustrate(
     let (tree, most) = component_pictures(&view, &basis, &studio, prepared, reporter)?;
     let (comparisons, error_most) = comparisons(sequence, &studio, test_shapes, shapes, &aligned)?;
     reporter.advance((view.component_count() + COMPARISON_COUNT) as u64, "");
-    let diagonal = sinew_trainer::learn::package::bounding_diagonal(&prepared.rest_positions);
+    let diagonal = sinew_trainer::learn::draft::bounding_diagonal(&prepared.rest_positions);
     let percent = |length: f32| format!("{:.1} % of the bounding box", 100.0 * length / diagonal);
 
     let mut all_facts = vec![

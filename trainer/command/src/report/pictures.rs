@@ -2,7 +2,8 @@
 
 use super::color::{ColorMap, Linear};
 use super::image::Image;
-use super::raster::{Style, Surface, draw};
+use super::raster::{Style, Surface};
+use super::shade::draw;
 use super::view::Camera;
 
 /// One camera, one style, one connectivity: pictures of a studio can be laid side by side.

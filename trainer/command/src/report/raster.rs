@@ -1,8 +1,6 @@
 //! The rasteriser: which face each sample of a picture sees. A z-buffer over triangles, no more; `shade` colours it.
 
 use super::color::Linear;
-use super::image::Image;
-use super::shade::shade;
 use super::view::Camera;
 use nalgebra::Vector3;
 
@@ -65,18 +63,6 @@ pub(super) struct Seen {
     pub(super) weights: Vec<[f32; 2]>,
 }
 
-/// Draws a surface on a transparent ground. The same input gives the same pixels.
-pub fn draw(camera: &Camera, surface: &Surface<'_>, style: &Style) -> Image {
-    let style = Style {
-        width: style.width.max(1),
-        height: style.height.max(1),
-        samples: style.samples.max(1),
-        ..*style
-    };
-    let seen = rasterize(camera, surface, &style);
-    shade(camera, surface, &style, &seen)
-}
-
 /// Samples of the picture from the plane at distance 1: `[x, y]`, y down.
 pub(super) fn sample_from_plane(camera: &Camera, width: usize, height: usize, [x, y]: [f64; 2]) -> [f64; 2] {
     let scale = height as f64 / camera.height;
@@ -86,7 +72,7 @@ pub(super) fn sample_from_plane(camera: &Camera, width: usize, height: usize, [x
     ]
 }
 
-fn rasterize(camera: &Camera, surface: &Surface<'_>, style: &Style) -> Seen {
+pub(super) fn rasterize(camera: &Camera, surface: &Surface<'_>, style: &Style) -> Seen {
     let (width, height) = (
         (style.width * style.samples) as usize,
         (style.height * style.samples) as usize,

@@ -2,7 +2,7 @@
 
 use super::color::{CLAY, Linear, linear_from_hex, srgb_byte};
 use super::image::Image;
-use super::raster::{NOTHING, Seen, Style, Surface, pick};
+use super::raster::{NOTHING, Seen, Style, Surface, pick, rasterize};
 use super::view::Camera;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -25,7 +25,19 @@ const SHADOW_DARKNESS: f64 = 0.38;
 /// Cells a side of the shadow's map.
 const SHADOW_CELLS: usize = 160;
 
-pub(super) fn shade(camera: &Camera, surface: &Surface<'_>, style: &Style, seen: &Seen) -> Image {
+/// Draws a surface on a transparent ground. The same input gives the same pixels.
+pub fn draw(camera: &Camera, surface: &Surface<'_>, style: &Style) -> Image {
+    let style = Style {
+        width: style.width.max(1),
+        height: style.height.max(1),
+        samples: style.samples.max(1),
+        ..*style
+    };
+    let seen = rasterize(camera, surface, &style);
+    shade(camera, surface, &style, &seen)
+}
+
+fn shade(camera: &Camera, surface: &Surface<'_>, style: &Style, seen: &Seen) -> Image {
     let scene = Scene {
         camera,
         surface,

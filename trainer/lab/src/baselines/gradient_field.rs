@@ -9,7 +9,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use sinew_trainer::features::reconstruct::PoissonSystem;
 use sinew_trainer::mesh::sparse_factor::{FactorError, SparseFactor};
-use sinew_trainer::mesh::topology::{Topology, corners, cross, difference, dot, is_flat, length, names_a_vertex_twice};
+use sinew_trainer::mesh::topology::{Topology, corners, is_flat, names_a_vertex_twice};
+use sinew_trainer::mesh::vector::{cross, difference, dot, length};
 
 /// Half a cotangent stays within this: obtuse corners still pull a little, slivers do not outweigh all.
 const HALF_COTANGENT_RANGE: (f64, f64) = (0.01, 10.0);

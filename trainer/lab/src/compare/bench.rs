@@ -100,7 +100,7 @@ impl<'a> Bench<'a> {
 
     /// Length of the reference's bounding box.
     pub(super) fn diagonal(&self) -> f64 {
-        f64::from(sinew_trainer::learn::package::bounding_diagonal(
+        f64::from(sinew_trainer::learn::draft::bounding_diagonal(
             &self.prepared.rest_positions,
         ))
     }

@@ -14,7 +14,7 @@ use sinew_command::report::pictures::{Studio, distances, quantile};
 use sinew_command::report::raster::Style;
 use sinew_command::report::svg::{Bar, Line, bar_chart, escape, log_chart, number};
 use sinew_trainer::features::align::{RigidMotion, widened};
-use sinew_trainer::learn::package::bounding_diagonal;
+use sinew_trainer::learn::draft::bounding_diagonal;
 
 /// The page, drawn.
 #[derive(Debug, Clone)]

@@ -1,12 +1,13 @@
 //! Components as morph targets, where a straight blend is near enough.
 
-use miette::{Report, WrapErr};
-use rayon::prelude::*;
+use miette::{IntoDiagnostic, WrapErr};
 use sinew_interchange::PuppetClip;
 use sinew_runtime::Basis;
+use sinew_trainer::evaluate::{PlayError, Player};
 use sinew_trainer::learn::Reporter;
+use sinew_trainer::learn::draft::with_players;
 
-use super::played::{ClipReport, ClipSettings, Distances, Player, check_stop, distance, report};
+use super::played::{ClipReport, ClipSettings, Distances, check_stop, distance, report, widened};
 use sinew_command::console::Console;
 use sinew_command::inputs::Failure;
 
@@ -25,9 +26,8 @@ pub struct Morphs {
 pub fn fit_morphs(basis: &Basis<'_>, rest: &[[f32; 3]], allowed: f64, console: &Console) -> Result<Morphs, Failure> {
     let count = basis.component_count();
     console.stage("morph targets", count as u64);
-    let fit = |k: usize| -> Result<(Vec<[f32; 3]>, f64), Report> {
+    let fit = |player: &mut Player<'_>, &k: &usize| -> Result<(Vec<[f32; 3]>, f64), PlayError> {
         let component = basis.component(k);
-        let mut player = Player::new(*basis)?;
         let ends = [component.minimum, component.maximum];
         let weights = ends
             .iter()
@@ -36,8 +36,8 @@ pub fn fit_morphs(basis: &Basis<'_>, rest: &[[f32; 3]], allowed: f64, console: &
         let mut row = vec![0.0; count];
         let mut poses = Vec::new();
         for weight in weights {
-            row[k] = weight;
-            poses.push((f64::from(weight), player.positions(&row)?));
+            row[k] = f64::from(weight);
+            poses.push((f64::from(weight), player.play(&row)?.to_vec()));
         }
         let squares: f64 = poses.iter().map(|(weight, _)| weight * weight).sum();
         let direction = |v: usize, c: usize| {
@@ -60,7 +60,8 @@ pub fn fit_morphs(basis: &Basis<'_>, rest: &[[f32; 3]], allowed: f64, console: &
         }
         Ok((shape, farthest))
     };
-    let fits = (0..count).into_par_iter().map(fit).collect::<Result<Vec<_>, _>>()?;
+    let all: Vec<usize> = (0..count).collect();
+    let fits = with_players(basis, &all, fit).into_diagnostic()?;
     console.finish();
     let mut morphs = Morphs::default();
     for (k, (shape, farthest)) in fits.into_iter().enumerate() {
@@ -79,6 +80,7 @@ impl Morphs {
         &self,
         name: &str,
         rows: &[Vec<f32>],
+        basis: &Basis<'_>,
         player: &mut Player<'_>,
         rest: &[[f32; 3]],
         settings: &ClipSettings<'_>,
@@ -100,13 +102,14 @@ impl Morphs {
             };
             let played: Vec<[f32; 3]> = (0..rest.len()).map(|v| core::array::from_fn(|c| blend(v, c))).collect();
             let true_positions = player
-                .positions(row)
+                .play(&widened(row))
+                .into_diagnostic()
                 .wrap_err_with(|| format!("frame {n} of clip {name} cannot be played"))?;
-            distances.add(&played, &true_positions);
+            distances.add(&played, true_positions);
             weights.push(chosen);
             settings.console.advance(n as u64 + 1, "");
         }
-        let report = report(name, rows.len(), rows.len(), &distances, settings, player);
+        let report = report(name, rows.len(), rows.len(), &distances, settings, basis);
         let clip = PuppetClip {
             name: name.into(),
             fps: settings.fps,

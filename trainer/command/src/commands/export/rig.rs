@@ -1,11 +1,14 @@
 //! Bones as the joints of a skin.
 
-use miette::WrapErr;
+use miette::{IntoDiagnostic, WrapErr};
 use sinew_interchange::{Dress, Joint, JointPose, PuppetClip, Skin, skinned};
-use sinew_runtime::{Basis, BoneName};
+use sinew_runtime::{
+    Basis, BoneMaps, BoneName, BoneOutput, BoneTransform, Controls, Kernels, TierChoice, Workspace, WorkspaceLayout,
+};
+use sinew_trainer::evaluate::Player;
 use sinew_trainer::learn::Reporter;
 
-use super::played::{ClipReport, ClipSettings, Distances, Player, check_stop, distance, joint, report};
+use super::played::{ClipReport, ClipSettings, Distances, check_stop, distance, joint, report, widened};
 use sinew_command::inputs::Failure;
 
 /// Bones as joints.
@@ -67,13 +70,28 @@ impl Rig {
         &self,
         name: &str,
         rows: &[Vec<f32>],
+        basis: &Basis<'_>,
         player: &mut Player<'_>,
         settings: &ClipSettings<'_>,
     ) -> Result<(PuppetClip, ClipReport), Failure> {
+        let layout = WorkspaceLayout::for_tier(basis, TierChoice::Bones).into_diagnostic()?;
+        let mut memory = vec![0; layout.unaligned_bytes()];
+        let mut workspace =
+            Workspace::for_tier(basis, TierChoice::Bones, &mut memory, Kernels::detect()).into_diagnostic()?;
+        let mut weights = vec![0.0; basis.component_count()];
+        let mut maps = vec![BoneTransform::default(); self.rest.len()];
         let mut poses = Vec::with_capacity(rows.len());
         for (n, row) in rows.iter().enumerate() {
-            let pose = player.joints(row, self.rest.len());
-            poses.push(pose.wrap_err_with(|| format!("frame {n} of clip {name} cannot be played"))?);
+            weights.copy_from_slice(row);
+            BoneMaps {
+                basis,
+                controls: &Controls::resume(basis, &mut weights).into_diagnostic()?,
+                maps: BoneOutput::Scaled(&mut maps),
+            }
+            .run(&mut workspace)
+            .into_diagnostic()
+            .wrap_err_with(|| format!("frame {n} of clip {name} cannot be played"))?;
+            poses.push(maps.iter().map(joint).collect());
         }
         let clip = PuppetClip::of_poses(
             name,
@@ -87,10 +105,10 @@ impl Rig {
         for (n, row) in rows.iter().enumerate() {
             check_stop(settings.console, name, n)?;
             let played = skinned(&self.dress, &self.positions, &clip.pose(n, &self.rest));
-            distances.add(&played, &player.positions(row)?);
+            distances.add(&played, player.play(&widened(row)).into_diagnostic()?);
             settings.console.advance(n as u64 + 1, "");
         }
-        let report = report(name, rows.len(), clip.key_count(), &distances, settings, player);
+        let report = report(name, rows.len(), clip.key_count(), &distances, settings, basis);
         Ok((clip, report))
     }
 }
