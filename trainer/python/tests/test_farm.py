@@ -77,3 +77,11 @@ def test_what_was_done_is_not_done_again_and_what_is_refused_is_said(tmp_path, s
     assert first == again and "still" in first[1]["error"]
     assert (tmp_path / "out" / "flag0-quick-seed0.sinew").stat().st_mtime_ns == made
     assert sinew.load(tmp_path / "out" / "flag0-quick-seed0.sinew").kind == "compact"
+
+
+def test_sequences_without_names_of_their_own_are_refused(tmp_path):
+    with pytest.raises(sinew.SinewError, match="rename one"):
+        farm([tmp_path / "a.abc", tmp_path / "b" / "a.usd"], tmp_path / "out")
+    with pytest.raises(sinew.SinewError, match="no sequences"):
+        farm([], tmp_path / "out")
+    assert not (tmp_path / "out").exists()

@@ -77,12 +77,18 @@ def farm(
     address: of a Ray cluster; by default one that runs already (`RAY_ADDRESS`), or this machine.
     Returns the rows of the table. A task that Sinew refuses has its sentence in the column `error`, and no package.
     """
+    paths: dict[str, Path] = {}
+    for path in map(Path, sequences):
+        if path.stem in paths:
+            raise sinew.SinewError(f"{paths[path.stem]} and {path} have one name, and so would their packages: rename one")
+        paths[path.stem] = path.resolve()
+    if not paths:
+        raise sinew.SinewError("there are no sequences")
     import ray
 
     output = Path(output)
     output.mkdir(parents=True, exist_ok=True)
     settings = {"": ""} if settings is None else settings
-    paths = {Path(path).stem: Path(path).resolve() for path in sequences}
     jobs = {
         "-".join(filter(None, (name, label, f"seed{seed}"))): (name, label, seed)
         for name in paths
@@ -148,16 +154,19 @@ def main() -> None:
         if not name or not Path(file).is_file():
             parser.error(f"{item} is not NAME=FILE of a file that is there")
         settings[name] = Path(file).read_text()
-    table = farm(
-        sequences,
-        arguments.output,
-        seeds=arguments.seeds,
-        settings=settings or None,
-        every=arguments.every,
-        cpus=arguments.cpus,
-        address=arguments.address,
-        progress=True,
-    )
+    try:
+        table = farm(
+            sequences,
+            arguments.output,
+            seeds=arguments.seeds,
+            settings=settings or None,
+            every=arguments.every,
+            cpus=arguments.cpus,
+            address=arguments.address,
+            progress=True,
+        )
+    except sinew.SinewError as error:
+        parser.error(f"{arguments.folder}: {error}")
     failed = [row for row in table if "error" in row]
     print(f"{arguments.output / 'figures.csv'}: {len(table)} rows, {len(failed)} refused")
     raise SystemExit(2 if failed else 0)
